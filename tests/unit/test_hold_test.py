@@ -12,14 +12,17 @@ import flightid as fid
 from flightid.conventions import Light
 from flightid.identification import hold_likelihood
 from flightid.identification.hold_likelihood import HeldOutputs, held_outputs
+from flightid.identification.hold_slopes import FormedSlopes, SummedSlopes
 from flightid.identification.hold_steps import (
     products_of,
     some_columns,
-    squares_of,
     steps_of,
     weighed,
 )
 from flightid.identification.hold_test import judged
+from flightid.identification.output_error.distinct import run_with_slopes
+from flightid.identification.records.options import RecordOptions
+from flightid.identification.records.setup import prepare_records
 from flightid.identification.rival_holds import OtherHold
 from flightid.identification.told_hold import _on_samples
 from flightid.models import load_model
@@ -265,13 +268,15 @@ def test_likelihood_under_another_hold_is_what_a_fit_under_it_finds(
 ) -> None:
     record = holds.flight(0, "straight", told=False)
     fit, other = (fid.identify(holds.model(), record, hold=hold) for hold in ("zero", "first"))
-    run, sloped = hold_likelihood.run_with_slopes, list[bool]()
+    sloped = list[bool]()
+    for name in ("residuals_of", "begun_with_slopes"):
+        run = getattr(hold_likelihood, name)
 
-    def counted(*given: Any, **how: bool) -> Any:
-        sloped.append(how["sloped"])
-        return run(*given, **how)
+        def counted(*given: Any, run: Any = run, with_slopes: bool = name[0] == "b") -> Any:
+            sloped.append(with_slopes)
+            return run(*given)
 
-    monkeypatch.setattr(hold_likelihood, "run_with_slopes", counted)
+        monkeypatch.setattr(hold_likelihood, name, counted)
     here, there = held_outputs(fit.model, [record], {}, ["zero", "first"])
     # Slopes stay where the first step leads nowhere; half a sample is 140 standard errors, which
     # both begin without: the delay of the other is moved by it.
@@ -295,13 +300,13 @@ def test_steps_beside_a_fit_begin_at_its_own_numbers_of_each_record(
         moved = {name: record[name] + 0.01 * (place + 1) for name in ("alpha", "q")}
         records[place] = record.replace(moved)
     fit = fid.identify(holds.model(), records, output_bias=True)
-    run, begun = hold_likelihood.run_with_slopes, list[Any]()
+    run, begun = hold_likelihood.begun_with_slopes, list[Any]()
 
-    def seen(*given: Any, **how: bool) -> Any:
-        begun.append(given[4])
-        return run(*given, **how)
+    def seen(*given: Any) -> Any:
+        begun.append(given[3])
+        return run(*given)
 
-    monkeypatch.setattr(hold_likelihood, "run_with_slopes", seen)
+    monkeypatch.setattr(hold_likelihood, "begun_with_slopes", seen)
     given = {"output_bias": True}
     (here,) = held_outputs(fit.model, records, given, ["zero"], beside=fit)
     for record, own in zip(fit.records, begun[:2], strict=True):
@@ -431,13 +436,35 @@ def test_a_closed_loop_does_not_speak_against_a_hold_that_is_true() -> None:
 def test_products_of_a_step_are_those_of_its_columns() -> None:
     random = np.random.default_rng(0)
     left, slopes = random.standard_normal((2, 700)), random.standard_normal((2, 700, 5))
-    weights = np.array([0.5, 3.0])
-    rows = np.concatenate(list(weighed(left, slopes, weights, 3)))
-    found = products_of(left, slopes, squares_of(slopes), weights, 3)
+    weights, formed = np.array([0.5, 3.0]), FormedSlopes(slopes, 3)
+    rows = np.concatenate(list(weighed(left, formed, weights, 3)))
+    found = products_of(formed.products(left), weights, 3)
     assert_close(found, rows.T @ rows, rtol=1e-12, why="rounding of two ways")
-    some = np.concatenate(list(some_columns(left, slopes, 3, [5, 0, 4])))
+    some = np.concatenate(list(some_columns(left, formed, 3, [5, 0, 4])))
     taken = np.repeat(weights, 700)[:, None] * some
     assert_close(taken, rows[:, [5, 0, 4]], rtol=1e-15, why="the same numbers")
+
+
+@pytest.mark.parametrize("shifted", [False, True])
+def test_sums_of_a_run_are_those_of_its_derivatives(*, shifted: bool) -> None:
+    record, model = holds.flight(0, "steps", told="zero"), holds.model()
+    options = RecordOptions(initial_state="estimate", output_bias=True, input_bias=shifted)
+    prepared = prepare_records(model, record, options)
+    (own,), (_, measured, _) = prepared.own, prepared.arrays[0]
+    summed = SummedSlopes(prepared, 0, own)
+    formed = FormedSlopes(summed.columns(), len(model.parameters.free))
+    left, products = summed.begun()
+    run = run_with_slopes(model, prepared, None, 0, own, sloped=False)[0]
+    assert_close(left, measured - run, atol=1e-12 * np.ptp(measured), why="rounding")
+    for rest, found in ((left, products), (measured, summed.products(measured))):
+        wanted = formed.products(rest)
+        size = np.sqrt(np.einsum("kii->ki", wanted))
+        scale = np.where(size > 0.0, size, 1.0)
+        share = (found - wanted) / scale[:, :, None] / scale[:, None]
+        assert_close(share, np.zeros_like(share), atol=1e-12, why="rounding of two ways")
+    step = np.random.default_rng(1).standard_normal(wanted.shape[1] - 1)
+    for found, wanted in zip(summed.stepped(left, step), formed.stepped(left, step), strict=True):
+        assert_close(found, wanted, rtol=1e-9, atol=1e-9 * np.ptp(wanted), why="two ways")
 
 
 def test_own_numbers_of_one_effect_take_nothing_from_shared_parameters() -> None:
@@ -449,8 +476,9 @@ def test_own_numbers_of_one_effect_take_nothing_from_shared_parameters() -> None
         slopes[0, :, 2:], slopes[1, :, 2:] = [1.0, 0.0, 1.0], [0.0, 1.0, 0.0]
         records.append((10.0 * random.standard_normal((2, n)), slopes))
     left, slopes = zip(*records, strict=True)
-    squares = [squares_of(each) for each in slopes]
-    found = steps_of(left, slopes, squares, np.array([2.0, 0.5]), 2, None)
+    formed = [FormedSlopes(each, 2) for each in slopes]
+    products = [each.products(rest) for each, rest in zip(formed, left, strict=True)]
+    found = steps_of(left, formed, products, np.array([2.0, 0.5]), 2, None)
     whole, target = np.zeros((1500, 8)), np.concatenate([each.ravel() for each in left])
     weights = np.concatenate([np.repeat([0.5, 2.0], n) for n in (300, 450)])
     for place, (first, each) in enumerate(zip((0, 600), slopes, strict=True)):

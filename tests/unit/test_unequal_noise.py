@@ -9,6 +9,7 @@ from scipy.stats import norm, rankdata
 
 import flightid as fid
 from flightid.conventions import Light
+from flightid.uncertainty import unequal_noise
 from flightid.uncertainty.blocks import RecordBlock
 from flightid.uncertainty.coloured_residuals import ResidualCovariance, residual_covariance
 from flightid.uncertainty.residual_colour import IN_DOUBT, UNEQUAL, WORTH_A_WORD, colour_findings
@@ -127,14 +128,24 @@ def _block(seed: int, growth: float, *, ties: bool = False) -> RecordBlock:
 WHITE = [Autoregression(np.ones(1), np.empty(0), 400, 0)]
 
 
-def test_noise_of_one_power_needs_no_correlations_of_long_rows(
+def test_noise_of_one_power_needs_no_correlations_of_long_rows_nor_sorted_signals(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
+    ranked, made = list[np.ndarray](), unequal_noise.ranks
+
+    def counted(row: np.ndarray) -> np.ndarray:
+        ranked.append(row)
+        return made(row)
+
     def refused(_: np.ndarray) -> np.ndarray:
         raise AssertionError("a bound has told it")
 
     monkeypatch.setattr("flightid.uncertainty.unequal_noise._correlations", refused)
-    assert not unequal_outputs(WHITE, [_block(4, 0.0), _block(5, 0.0)], np.eye(2))
+    monkeypatch.setattr(unequal_noise, "ranks", counted)
+    blocks = [_block(4, 0.0), _block(5, 0.0)]
+    assert not unequal_outputs(WHITE, blocks, np.eye(2))
+    for row, block in zip(ranked, blocks, strict=True):
+        assert_close(row, np.abs(Innovations.of(WHITE[0], block, 0).errors), rtol=1e-12, why="same")
 
 
 def test_noise_with_a_drift_is_foretold_by_its_last_forty_samples_at_most() -> None:

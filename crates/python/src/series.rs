@@ -5,6 +5,7 @@
 use flightid_core::frequency_domain::composite::{CompositeRule, composite as core_composite};
 use flightid_core::numerics::folded_frames::{Frames, folded_frames as folded};
 use flightid_core::numerics::levinson::weights as levinson;
+use flightid_core::numerics::rank_bounds::rank_bound;
 use flightid_core::numerics::ranks::ranks as ranked;
 use flightid_core::numerics::slow_drift::{Parts, Rounds, Spectrum};
 use numpy::{IntoPyArray, PyArray1, PyUntypedArrayMethods};
@@ -128,6 +129,23 @@ fn ranks<'py>(py: Python<'py>, row: RowMajor1<'_, f64>) -> PyResult<Bound<'py, P
     Ok(py.detach(|| ranked(row)).into_pyarray(py))
 }
 
+/// rank_bounds(rows: NDArray[np.float64], ranks: NDArray[np.float64]) -> NDArray[np.float64]
+///
+/// Upper bounds of the mean products of ranks, of unit mean square, with the ranks of each of some
+/// rows of numbers that are not negative; infinite where nothing is told.
+#[pyfunction]
+fn rank_bounds<'py>(
+    py: Python<'py>,
+    rows: RowMajor2<'_, f64>,
+    ranks: RowMajor1<'_, f64>,
+) -> PyResult<Bound<'py, PyArray1<f64>>> {
+    let n = rows.as_array().ncols().max(1);
+    let (rows, ranks) = (rows.as_slice()?, ranks.as_slice()?);
+    let found: Vec<f64> =
+        py.detach(|| rows.chunks_exact(n).map(|row| rank_bound(row, ranks)).collect());
+    Ok(found.into_pyarray(py))
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
@@ -137,6 +155,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(drift_beside, module)?)?;
     module.add_function(wrap_pyfunction!(drift_likelihood, module)?)?;
     module.add_function(wrap_pyfunction!(folded_frames, module)?)?;
+    module.add_function(wrap_pyfunction!(rank_bounds, module)?)?;
     module.add_function(wrap_pyfunction!(ranks, module)?)?;
     module.add_function(wrap_pyfunction!(autoregression_weights, module)?)
 }

@@ -142,7 +142,8 @@ def later_by(model: GreyBoxModel, time_s: float) -> Array:
     values = np.array([parameter.value or 0.0 for parameter in free])
     delays = _delays_of(model)
     slopes = np.zeros((len(delays), len(free)))
-    for place, parameter in enumerate(free):
+    # Equations without a delay of their own have none that moves.
+    for place, parameter in enumerate(free if getattr(model, "delays", True) else ()):
         change = DIFFERENCE * (abs(values[place]) or 1.0)
         moved = _delays_of(model.with_values({parameter.name: values[place] + change}))
         slopes[:, place] = (moved - delays) / change

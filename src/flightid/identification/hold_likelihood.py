@@ -20,8 +20,16 @@ from flightid.errors import DataError, FlightidError
 from flightid.frozen import dataclass
 from flightid.identification.delay_cells import DelayCells, later_by
 from flightid.identification.fit import Fit
-from flightid.identification.hold_steps import changes_of, squares_of, squares_over, steps_of
-from flightid.identification.output_error.distinct import run_with_slopes
+from flightid.identification.hold_slopes import (
+    LEFT,
+    OWN,
+    SHARED,
+    RunSlopes,
+    begun_with_slopes,
+    residuals_of,
+    whitened,
+)
+from flightid.identification.hold_steps import steps_of
 from flightid.identification.output_error.equation_records import (
     EquationRuns,
     equation_runs,
@@ -32,7 +40,6 @@ from flightid.identification.records.setup import OwnNumbers, RecordSet, prepare
 from flightid.models import GreyBoxModel
 from flightid.record import Record
 from flightid.record.hold import InputHold
-from flightid.recursive_filter import filtered
 from flightid.responses import FrequencyResponse
 from flightid.uncertainty.foretold import expected_gain, likelihood_gain
 
@@ -225,15 +232,6 @@ def _whitening(left: Sequence[Array]) -> list[Array]:
     return found
 
 
-def _whitened(values: Array, filters: Sequence[Array] | None) -> Array:
-    """Values or slopes, shape (n_outputs, n_samples, …), along the samples."""
-    if filters is None:
-        return values
-    return np.stack(
-        [filtered(f, [1.0], row, axis=0) for f, row in zip(filters, values, strict=True)]
-    )
-
-
 def _under(
     prepared: RecordSet,
     runs_of: EquationRuns | None,
@@ -245,45 +243,48 @@ def _under(
     sizes = np.std(np.concatenate([each[1] for each in prepared.arrays], axis=1), axis=1)
     largest = FAR * sizes
     samples = sum(each[1].size for each in prepared.arrays)
-    slopes: list[Array] = []
-    squares: list[Array] = []
+    slopes: list[RunSlopes] = []
     for round_ in range(STEPS if filters is None else COLOURED_STEPS):
         if round_:
             model = prepared.model.with_values(dict(zip(free, map(float, values), strict=True)))
             prepared = replace(prepared, model=model)
-        runs = [
-            run_with_slopes(prepared.model, prepared, runs_of, place, own, sloped=not slopes)
-            for place, own in enumerate(prepared.own)
-        ]
-        left = [each[1] - run[0] for each, run in zip(prepared.arrays, runs, strict=True)]
-        _require_near(left, [slope for _, slope in runs], largest)
-        left = [_whitened(each, filters) for each in left]
-        if not slopes:
-            slopes = [_whitened(slope, filters) for _, slope in runs]
-            squares = [squares_of(slope) for slope in slopes]
-        del runs  # whose slopes would stand beside the next ones
+        if slopes:
+            left = [residuals_of(prepared, runs_of, *each) for each in enumerate(prepared.own)]
+            _require_near(left, slopes, largest)
+            left = [whitened(each, filters) for each in left]
+            products = [each.products(rest) for each, rest in zip(slopes, left, strict=True)]
+        else:
+            begun = [
+                begun_with_slopes(prepared, runs_of, *each, filters)
+                for each in enumerate(prepared.own)
+            ]
+            left, slopes = [each[0] for each in begun], [each[2] for each in begun]
+            _require_near(left, slopes, largest)
+            left = [whitened(each, filters) for each in left]
+            products = [each[1] for each in begun]
         limits = None if cell is None else (cell[0] - values, cell[1] - values)
-        steps = steps_of(left, slopes, squares, sizes, len(free), limits)
-        changes = [changes_of(*pair, len(free)) for pair in zip(slopes, steps, strict=True)]
-        left = [rest - shared - own for rest, (shared, own) in zip(left, changes, strict=True)]
-        sizes = np.sqrt(np.mean(np.concatenate(left, axis=1) ** 2, axis=1))
-        shared, own = ([each[place] for each in changes] for place in (0, 1))
-        moved = squares_over(shared, sizes), squares_over(own, sizes)
-        if moved[0] > SHORT or moved[1] > NEAR * samples:
+        steps = steps_of(left, slopes, products, sizes, len(free), limits)
+        ends = [run.stepped(*pair) for run, *pair in zip(slopes, left, steps, strict=True)]
+        left = [each for each, _ in ends]
+        squares = np.sum([each for _, each in ends], axis=0)
+        sizes = np.sqrt(squares[:, LEFT] * len(sizes) / samples)
+        over = squares / np.where(sizes > 0.0, sizes, 1.0)[:, None] ** 2
+        moved = np.sum(over, axis=0)
+        if moved[SHARED] > SHORT or moved[OWN] > NEAR * samples:
             slopes = []
-        ended = sum(moved) < SETTLED
+        ended = moved[SHARED] + moved[OWN] < SETTLED
         values = values + steps[0][: len(free)]
-        begun = [
+        own = [
             numbers.filled(_free_values(numbers) + step[len(free) :])
             for numbers, step in zip(prepared.own, steps, strict=True)
         ]
-        prepared = replace(prepared, own=begun)
+        prepared = replace(prepared, own=own)
         if ended:
             break
     return HeldOutputs(values, left)
 
 
-def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array) -> None:
+def _require_near(left: Sequence[Array], slopes: Sequence[RunSlopes], largest: Array) -> None:
     """Refuse to step from a model that is nowhere near its records.
 
     Raises
@@ -291,11 +292,8 @@ def _require_near(left: Sequence[Array], slopes: Sequence[Array], largest: Array
     DataError
         A run that explodes, or leaves far more than there was.
     """
-    sound = all(
-        np.all(np.abs(rest) <= largest[:, None]) and np.isfinite(np.sum(slope))
-        for rest, slope in zip(left, slopes, strict=True)
-    )
-    if not sound:
+    near = all(np.all(np.abs(rest) <= largest[:, None]) for rest in left)
+    if not (near and all(each.is_finite for each in slopes)):
         raise DataError(
             "a step under another hold leads away from the records",
             found=f"residuals above {FAR:g} times the outputs",

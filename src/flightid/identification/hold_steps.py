@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid.identification.hold_slopes import RunSlopes
 from flightid.uncertainty.triangle import triangle_of_parts, triangle_of_rows
 
 Array = NDArray[np.float64]
@@ -20,44 +21,39 @@ AT_ONCE = 1 << 16
 """Rows that are turned into a triangle together."""
 
 
-def squares_of(slopes: Array) -> Array:
-    """Products of slopes by all numbers with all, of each output, (n_outputs, k, k)."""
-    with np.errstate(over="ignore", invalid="ignore"):
-        return np.array([slope.T @ slope for slope in slopes])
-
-
-def changes_of(slopes: Array, step: Array, n_free: int) -> tuple[Array, Array]:
-    """What a step changes of outputs by the shared parameters, and by the record's own numbers."""
-    apart = np.zeros((len(step), 2))
-    apart[:n_free, 0], apart[n_free:, 1] = step[:n_free], step[n_free:]
-    found = slopes @ apart
-    return found[:, :, 0], found[:, :, 1]
-
-
-def squares_over(changes: Sequence[Array], sizes: Array) -> float:
-    """Sum of squares of changes of outputs, each over what is left of it."""
-    total = np.sum([np.sum(each**2, axis=1) for each in changes], axis=0)
-    return float(np.sum(total / np.where(sizes > 0.0, sizes, 1.0) ** 2))
-
-
 def steps_of(
     left: Sequence[Array],
-    slopes: Sequence[Array],
-    squares: Sequence[Array],
+    slopes: Sequence[RunSlopes],
+    products: Sequence[Array],
     sizes: Array,
     n_free: int,
     limits: tuple[Array, Array] | None,
 ) -> list[Array]:
-    """Least squares: changes of the shared parameters and of each record's own numbers."""
+    """Least squares: changes of the shared parameters and of each record's own numbers.
+
+    Parameters
+    ----------
+    left : sequence of ndarray, shape (n_outputs, n_samples)
+        Residuals of each record.
+    slopes : sequence of RunSlopes
+    products : sequence of ndarray, shape (n_outputs, k, k)
+        What these give of the residuals.
+    sizes : ndarray, shape (n_outputs,)
+        Deviations that residuals are held against.
+    n_free : int
+        Shared parameters.
+    limits : tuple of ndarray, optional
+        Least and largest change of each shared parameter.
+    """
     weights = 1.0 / np.where(sizes > 0.0, sizes, 1.0)
     # Triangles hold all that least squares ask, of as many rows as there are numbers.
     triangles = [
         triangle_of_parts(
             partial(weighed, rest, slope, weights, n_free),
-            products_of(rest, slope, square, weights, n_free),
+            products_of(product, weights, n_free),
             partial(some_columns, rest, slope, n_free),
         )
-        for rest, slope, square in zip(left, slopes, squares, strict=True)
+        for rest, slope, product in zip(left, slopes, products, strict=True)
     ]
     seen = [_told_apart(each, each.shape[1] - n_free - 1) for each in triangles]
     triangles = [each for each, _ in seen]
@@ -101,20 +97,11 @@ def _inside(step: Array, triangle: Array, limits: tuple[Array, Array]) -> Array:
     return np.clip(clipped, *limits)
 
 
-def products_of(left: Array, slopes: Array, squares: Array, weights: Array, n_free: int) -> Array:
-    """Products of the columns that `weighed` gives, without a copy of long slopes.
-
-    Those of slopes, `squares` by output, are the same in steps that keep them.
-    """
-    count = slopes.shape[2]
-    found = np.zeros((count + 1, count + 1))
+def products_of(products: Array, weights: Array, n_free: int) -> Array:
+    """Products of the columns that `weighed` gives, from those by output."""
     with np.errstate(over="ignore", invalid="ignore"):
-        for rest, slope, square, weight in zip(left, slopes, squares, weights, strict=True):
-            found[:count, :count] += weight**2 * square
-            found[:count, count] += weight**2 * (slope.T @ rest)
-            found[count, count] += weight**2 * (rest @ rest)
-    found[count, :count] = found[:count, count]
-    places = _order(count, n_free)
+        found = np.tensordot(weights**2, products, axes=1)
+    places = _order(len(found) - 1, n_free)
     return np.asarray(found[np.ix_(places, places)])
 
 
@@ -123,17 +110,20 @@ def _order(count: int, n_free: int) -> list[int]:
     return [*range(n_free, count), *range(n_free), count]
 
 
-def some_columns(left: Array, slopes: Array, n_free: int, places: Sequence[int]) -> Iterator[Array]:
+def some_columns(
+    left: Array, slopes: RunSlopes, n_free: int, places: Sequence[int]
+) -> Iterator[Array]:
     """Some columns of `weighed`, by output and without its weights."""
-    order = _order(slopes.shape[2], n_free)
-    for rest, slope in zip(left, slopes, strict=True):
+    columns = slopes.columns()
+    order = _order(columns.shape[2], n_free)
+    for rest, slope in zip(left, columns, strict=True):
         whole = [rest if order[k] == slope.shape[1] else slope[:, order[k]] for k in places]
         yield np.column_stack(whole)
 
 
-def weighed(left: Array, slopes: Array, weights: Array, n_free: int) -> Iterator[Array]:
+def weighed(left: Array, slopes: RunSlopes, weights: Array, n_free: int) -> Iterator[Array]:
     """Rows of a record: own numbers' slopes, the shared ones', what is left."""
-    for rest, slope, weight in zip(left, slopes, weights, strict=True):
+    for rest, slope, weight in zip(left, slopes.columns(), weights, strict=True):
         for begin in range(0, len(rest), AT_ONCE):
             rows = slice(begin, begin + AT_ONCE)
             parts = slope[rows, n_free:], slope[rows, :n_free], rest[rows]

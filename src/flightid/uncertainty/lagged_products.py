@@ -13,6 +13,8 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid._native import products_at_lags
+
 Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 RIDGE = 1e-11
@@ -47,9 +49,8 @@ def lagged_products(records: Sequence[Array], first: int, longest: int) -> Array
     """
     lags, channels = np.arange(longest + 1), len(records[0])
     found = np.empty((lags.size, channels, lags.size, channels))
-    for lag in lags:
-        now = sum(x[:, first:] @ x[:, first - lag : x.shape[1] - lag].T for x in records)
-        found[0, :, lag], found[lag, :, 0] = now, np.transpose(now)
+    now = sum(products_at_lags(x[:, first:], x[:, first - longest :]) for x in records)
+    found[0], found[:, :, 0] = np.transpose(now, (2, 0, 1)), now
     # What comes in at the beginning and drops out at the end where both lags grow by one.
     shape = len(records), channels * longest
     begin = np.reshape([x[:, first - 1 - lags[:-1]].T for x in records], shape)
@@ -146,11 +147,10 @@ def products_with_past(news: Sequence[Array], records: Sequence[Array], longest:
     -------
     ndarray, shape (longest + 1, n_channels, n_news)
     """
-    found = np.zeros(((longest + 1) * len(records[0]), len(news[0])))
+    found = np.zeros((longest + 1, len(records[0]), len(news[0])))
     for new, rows in zip(news, records, strict=True):
-        for part, lags in at_lags(rows, new.shape[1], longest):
-            found += lags @ new[:, part].T
-    return found.reshape(longest + 1, len(records[0]), len(news[0]))
+        found += products_at_lags(new, rows[:, rows.shape[1] - new.shape[1] - longest :])
+    return found
 
 
 def at_lags(rows: Array, count: int, longest: int) -> Iterator[tuple[slice, Array]]:

@@ -15,7 +15,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid._native import ranks
+from flightid._native import rank_bounds, ranks
 from flightid.frozen import dataclass
 from flightid.recursive_filter import filtered
 from flightid.uncertainty.blocks import RecordBlock, halves, levels, of_all_halves
@@ -67,14 +67,14 @@ class Innovations:
 
 @dataclass(frozen=True, eq=False)
 class Ranks:
-    """Ranks of one output of one record, of unit variance about zero.
+    """One output of one record, whose ranks are of unit variance about zero.
 
     Attributes
     ----------
     noise : ndarray, shape (n_samples,)
-        Of its size.
+        Ranks of its size.
     signals : ndarray, shape (n_asked + 1, n_samples)
-        Of the square of what each parameter, and all of them together, make of each innovation.
+        Square of what each parameter, and all of them together, make of each innovation.
     """
 
     noise: Array
@@ -95,26 +95,33 @@ class Ranks:
             kept = kept[first : first + MOST]
         if kept.size < LEAST:
             return None
+        heard = _heard(noise, block.of_output(output)[1])
+        size = np.einsum("ij,jk,ik->i", half, heard.T @ heard / len(heard), half)
+        if kept.size < len(errors):
+            errors, heard = errors[kept], heard[kept]
         signals = np.empty((len(half) + 1, len(errors)))
         each = signals[:-1]
-        np.matmul(half, _heard(noise, block.of_output(output)[1]).T, out=each)
+        np.matmul(half, heard.T, out=each)
         np.square(each, out=each)
-        size = np.maximum(np.mean(each, axis=1), np.finfo(float).tiny)
-        np.matmul(1.0 / size, each, out=signals[-1])
-        if kept.size < len(errors):
-            errors, signals = errors[kept], np.take(signals, kept, axis=1)
-        for row in signals:
-            row[:] = ranks(row)
+        np.matmul(1.0 / np.maximum(size, np.finfo(float).tiny), each, out=signals[-1])
         return cls(ranks(np.abs(errors)), signals)
 
     @cached_property
-    def together(self) -> Array:
-        """Rank correlations, shape (n + 1,)."""
-        return np.asarray(self.signals @ self.noise / self.noise.size)
+    def most(self) -> Array:
+        """What rank correlations do not pass, shape (n_asked + 1,): without ranks of signals."""
+        return rank_bounds(self.signals, self.noise)
 
-    def counted(self, some: NDArray[np.intp]) -> Array:
-        """Samples that count of some signals: where both change slowly fewer are independent."""
-        slow = _correlations(self.signals[some]) @ _correlations(self.noise[None])[0]
+    def together(self, rows: Array) -> Array:
+        """Rank correlations of some signals' ranks with those of the noise."""
+        return np.asarray(rows @ self.noise / self.noise.size)
+
+    def ranked(self, some: NDArray[np.intp]) -> Array:
+        """Ranks of some signals."""
+        return np.array([ranks(row) for row in self.signals[some]])
+
+    def counted(self, rows: Array) -> Array:
+        """Samples that count of signals of such ranks: of slow ones fewer are independent."""
+        slow = _correlations(rows) @ _correlations(self.noise[None])[0]
         return np.asarray(self.noise.size / np.maximum(1.0, 1.0 + 2.0 * slow))
 
 
@@ -122,16 +129,30 @@ def _score(known: Sequence[Ranks], limit: float) -> float:
     """Largest score of all signals, or what none of them passes where that is below a limit.
 
     No more samples count than there are: by the inequality of Cauchy and Schwarz this bounds most
-    scores of noise of one power, without the correlations of long rows.
+    scores of noise of one power, without the correlations of long rows. Counts in buckets bound
+    those bounds: of most noise no signal is sorted.
     """
-    most = [np.maximum(each.together, 0.0) ** 2 * each.noise.size for each in known]
-    bound = np.sqrt(np.sum(most, axis=0))
-    some = np.flatnonzero(bound > limit)
+    some, bound = _beyond(known, [each.most for each in known], limit)
     if not some.size:
         return float(np.max(bound))
-    counted = [each.counted(some) for each in known]
-    moved = [each.together[some] * count for each, count in zip(known, counted, strict=True)]
+    rows = [each.ranked(some) for each in known]
+    together = [each.together(ranked) for each, ranked in zip(known, rows, strict=True)]
+    places, bound = _beyond(known, together, limit)
+    if not places.size:
+        return float(np.max(bound))
+    counted = [each.counted(ranked[places]) for each, ranked in zip(known, rows, strict=True)]
+    moved = [each[places] * count for each, count in zip(together, counted, strict=True)]
     return float(np.max(np.sum(moved, axis=0) / np.sqrt(np.sum(counted, axis=0))))
+
+
+def _beyond(
+    known: Sequence[Ranks], together: Sequence[Array], limit: float
+) -> tuple[NDArray[np.intp], Array]:
+    """Signals whose bound by rank correlations of each record passes a limit, and all bounds."""
+    pairs = zip(known, together, strict=True)
+    most = [np.maximum(each, 0.0) ** 2 * one.noise.size for one, each in pairs]
+    bound = np.sqrt(np.sum(most, axis=0))
+    return np.flatnonzero(bound > limit), bound
 
 
 def _correlations(rows: Array) -> Array:

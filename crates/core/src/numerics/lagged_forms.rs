@@ -53,7 +53,7 @@ fn add_sums(earlier: &[f64], later: &[f64], width: usize, found: &mut [f64]) {
 
 /// Inner products of one row with the beginnings of others, at least as long.
 #[inline(always)]
-fn products<const K: usize>(x: &[f64], others: [&[f64]; K]) -> [f64; K] {
+pub(crate) fn products<const K: usize>(x: &[f64], others: [&[f64]; K]) -> [f64; K] {
     let others = others.map(|other| &other[..x.len()]);
     let mut sums = [[0.0; LANES]; K];
     let (chunks, rest) = x.as_chunks::<LANES>();

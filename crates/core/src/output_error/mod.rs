@@ -13,5 +13,6 @@ pub mod output_sums;
 pub mod record_data;
 pub mod record_pass;
 pub mod shown_disturbances;
+pub mod slope_sums;
 pub mod state_space_family;
 pub mod transfer_family;

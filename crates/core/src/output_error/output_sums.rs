@@ -48,6 +48,12 @@ impl OutputSums {
         }
     }
 
+    /// Products (stride × stride, on and above the diagonal of tiles) and sums of each output.
+    pub fn by_output(&self) -> impl Iterator<Item = (&[f64], &[f64])> {
+        let stride = self.stride.max(1);
+        self.products.chunks_exact(stride * stride).zip(self.sums.chunks_exact(stride))
+    }
+
     /// Moments of the residuals under uncorrelated weights without a limit.
     pub fn moments(&self, weights: &Weights) -> Moments {
         let p = self.n_outputs;

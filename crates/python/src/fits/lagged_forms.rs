@@ -1,8 +1,10 @@
-//! Face of `flightid_core::numerics::lagged_forms`. (Python side: uncertainty/fitted_directions.py)
+//! Face of `flightid_core::numerics::lagged_forms` and `lagged_rows`.
+//! (Python side: uncertainty/fitted_directions.py, uncertainty/lagged_products.py)
 
 use flightid_core::CoreError;
 use flightid_core::numerics::lagged_forms::lagged_sums as summed;
-use numpy::{IntoPyArray, PyArray1};
+use flightid_core::numerics::lagged_rows;
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
@@ -28,10 +30,57 @@ fn lagged_sums<'py>(
     Ok(py.detach(|| summed(earlier, later, width, n_lags)).into_pyarray(py))
 }
 
+/// products_at_lags(now: NDArray[np.float64], past: NDArray[np.float64]) -> NDArray[np.float64]
+///
+/// Σ a(t) b(t − k) of rows a of `now` (p, n) and b of `past` (q, n + longest), which begin `longest`
+/// samples earlier, for lags from zero on: (longest + 1, q, p).
+#[pyfunction]
+fn products_at_lags<'py>(
+    py: Python<'py>,
+    now: RowMajor2<'_, f64>,
+    past: RowMajor2<'_, f64>,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let ((p, n), (q, needed)) = (now.as_array().dim(), past.as_array().dim());
+    let Some(longest) = needed.checked_sub(n) else {
+        return Err(from_core(CoreError::Shape {
+            what: "samples of the past",
+            found: needed,
+            needed: n,
+        }));
+    };
+    let (now, past) = (now.as_slice()?, past.as_slice()?);
+    let found = py.detach(|| lagged_rows::lagged_products(now, past, n, longest));
+    found.into_pyarray(py).reshape([longest + 1, q, p])
+}
+
+/// left_of_neighbours(rows: NDArray[np.float64], past: NDArray[np.float64], weights: NDArray[np.float64]) -> NDArray[np.float64]
+///
+/// a(t) − Σ w(a, k, b) b(t + k) of rows a of `rows` (p, n) and b of `past` (q, n + m − 1); weights
+/// (p, m q) are by k, then b.
+#[pyfunction]
+fn left_of_neighbours<'py>(
+    py: Python<'py>,
+    rows: RowMajor2<'_, f64>,
+    past: RowMajor2<'_, f64>,
+    weights: RowMajor2<'_, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let ((p, n), (q, length)) = (rows.as_array().dim(), past.as_array().dim());
+    let (m, needed) = ((length + 1).saturating_sub(n), weights.as_array().dim());
+    if needed != (p, m * q) {
+        let found = needed.0 * needed.1;
+        return Err(from_core(CoreError::Shape { what: "weights", found, needed: p * m * q }));
+    }
+    let (rows, past, weights) = (rows.as_slice()?, past.as_slice()?, weights.as_slice()?);
+    let left = py.detach(|| lagged_rows::left_of_neighbours(rows, past, weights, n, m));
+    left.into_pyarray(py).reshape([p, n])
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(lagged_sums, module)?)
+    module.add_function(wrap_pyfunction!(lagged_sums, module)?)?;
+    module.add_function(wrap_pyfunction!(left_of_neighbours, module)?)?;
+    module.add_function(wrap_pyfunction!(products_at_lags, module)?)
 }

@@ -7,10 +7,10 @@ use flightid_core::linear::discretisation::Hold;
 use flightid_core::output_error::likelihood::{Estimate, fit_from};
 use flightid_core::output_error::linear_family::LinearFamily;
 use flightid_core::output_error::linear_output_error::LinearTrajectories;
-use flightid_core::output_error::model_on_records::{Trajectories, Wanted};
+use flightid_core::output_error::model_on_records::{LANES, Trajectories, Wanted};
 use flightid_core::output_error::output_error_weights::Noise;
-use flightid_core::output_error::record_data::RecordData;
-use flightid_core::output_error::record_data::RecordInputs;
+use flightid_core::output_error::record_data::{RecordData, RecordInputs};
+use flightid_core::output_error::slope_sums::Sloped;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
 
@@ -99,7 +99,7 @@ pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<Rec
         .map(|((_, outputs, _), own)| {
             let (initial, shift, bias, free_initial, free_shift, free_bias, limits) = own;
             Ok(RecordData {
-                measured: outputs.as_array().t().iter().copied().collect(),
+                measured: by_sample(outputs)?,
                 initial: initial.as_slice()?.to_vec(),
                 shift: shift.as_slice()?.to_vec(),
                 bias: bias.as_slice()?.to_vec(),
@@ -110,6 +110,28 @@ pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<Rec
             })
         })
         .collect()
+}
+
+/// Copy a few numbers, of which calls that move memory would cost more than the numbers.
+fn copy_few(from: &[f64], into: &mut [f64]) {
+    let (chunks, rest) = from.as_chunks::<LANES>();
+    let into = &mut into[..from.len()];
+    let (wide, last) = into.as_chunks_mut::<LANES>();
+    wide.iter_mut().zip(chunks).for_each(|(into, each)| *into = *each);
+    for (place, value) in rest.iter().enumerate() {
+        last[place] = *value;
+    }
+}
+
+/// Channels, sample by sample: reading them in that order would cost what a run costs.
+fn by_sample(channels: &RowMajor2<'_, f64>) -> PyResult<Vec<f64>> {
+    let (p, n) = channels.as_array().dim();
+    let mut found = vec![0.0; p * n];
+    for (o, row) in channels.as_slice()?.chunks_exact(n.max(1)).enumerate() {
+        let places = found.chunks_exact_mut(p);
+        places.zip(row).for_each(|(sample, value)| sample[o] = *value);
+    }
+    Ok(found)
 }
 
 /// Fit from each start, or the words of the error that stopped it; with responses beside the records
@@ -233,13 +255,16 @@ pub fn run<'py, T: Trajectories>(
     let mut writable = made.readwrite();
     let slopes = writable.as_slice_mut()?;
     let mut sink = |first: usize, rows: &mut [f64]| {
-        for (place, row) in rows.chunks_exact(stride).enumerate() {
-            let (k, o) = (first + place / p, place % p);
-            outputs[o * n + k] = row[0];
-            let start = (o * n + k) * columns;
-            slopes[start..start + run].copy_from_slice(&row[1..1 + run]);
-            if let Some(bias) = biases.iter().position(|&output| output == o) {
-                slopes[start + run + bias] = 1.0;
+        for o in 0..p {
+            let bias = biases.iter().position(|&output| output == o);
+            for (k, sample) in rows.chunks_exact(p * stride).enumerate() {
+                let (row, at) = (&sample[o * stride..(o + 1) * stride], o * n + first + k);
+                outputs[at] = row[0];
+                let into = &mut slopes[at * columns..(at + 1) * columns];
+                copy_few(&row[1..1 + run], into);
+                if let Some(bias) = bias {
+                    into[run + bias] = 1.0;
+                }
             }
         }
     };
@@ -253,4 +278,51 @@ pub fn run<'py, T: Trajectories>(
         .map_err(from_core)?;
     drop(writable);
     Ok((outputs.into_pyarray(py).reshape([p, n])?, made))
+}
+
+/// Residuals (n_outputs × n_samples), and by output products of all columns with these last.
+pub type Summed<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
+
+/// What a step leaves of residuals (n_outputs × n_samples), and squares by output.
+pub type Stepped<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
+
+/// Residuals of one record, its run's where none are given, and by output the products of all columns
+/// of derivatives (θ, free initial states, shifts, biases) with these last.
+///
+/// # Errors
+/// Where the model has no run at θ, or residuals are of another length.
+pub fn slope_products<'py, T: Trajectories>(
+    py: Python<'py>,
+    trajectories: &T,
+    data: &RecordData,
+    theta: &[f64],
+    given: Option<RowMajor2<'py, f64>>,
+) -> PyResult<Summed<'py>> {
+    let sloped = Sloped::new(trajectories, 0, data, theta).map_err(from_core)?;
+    let given = given.as_ref().map(|each| each.as_slice()).transpose()?;
+    let (left, products) = sloped.products(given).map_err(from_core)?;
+    let (p, width) = (trajectories.n_outputs(), sloped.n_columns() + 1);
+    let left = left.into_pyarray(py);
+    let n = trajectories.record_lengths()[0];
+    Ok((left.reshape([p, n])?, products.into_pyarray(py).reshape([p, width, width])?))
+}
+
+/// What a step of all columns leaves of residuals, and by output the squares of changes by θ, of
+/// those by the record's own numbers, and of what is left.
+///
+/// # Errors
+/// As `slope_products`.
+pub fn slope_step<'py, T: Trajectories>(
+    py: Python<'py>,
+    trajectories: &T,
+    data: &RecordData,
+    theta: &[f64],
+    given: RowMajor2<'py, f64>,
+    step: RowMajor1<'py, f64>,
+) -> PyResult<Stepped<'py>> {
+    let sloped = Sloped::new(trajectories, 0, data, theta).map_err(from_core)?;
+    let found = sloped.stepped(given.as_slice()?, step.as_slice()?).map_err(from_core)?;
+    let (p, n) = (trajectories.n_outputs(), trajectories.record_lengths()[0]);
+    let squares = found.squares.as_flattened().to_vec().into_pyarray(py);
+    Ok((found.left.into_pyarray(py).reshape([p, n])?, squares.reshape([p, 3])?))
 }

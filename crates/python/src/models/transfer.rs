@@ -180,6 +180,61 @@ impl TransferFunctions {
         let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();
         output_error::run(py, &trajectories, &data, 0, &theta, with_slopes)
     }
+
+    /// slope_products(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, left: NDArray[np.float64] | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    ///
+    /// Residuals (n_outputs, n_samples), those of the run where none are given, and products of all
+    /// columns that `run_record` gives, residuals last, of each output (n_outputs, k + 1, k + 1).
+    #[allow(clippy::too_many_arguments)]
+    fn slope_products<'py>(
+        &self,
+        py: Python<'py>,
+        values: RowMajor1<'_, f64>,
+        free: Vec<usize>,
+        record: Flown<'_>,
+        own: Own<'_>,
+        hold: &str,
+        left: Option<RowMajor2<'py, f64>>,
+    ) -> PyResult<output_error::Summed<'py>> {
+        let values = values.as_slice()?;
+        let records = [record];
+        let trajectories = linear(
+            TransferFamily::new(&self.functions, &self.pairs, values, &free),
+            &records,
+            hold,
+        )?;
+        let data = record_data(&records, vec![own])?;
+        let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();
+        output_error::slope_products(py, &trajectories, &data[0], &theta, left)
+    }
+
+    /// slope_step(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, left: NDArray[np.float64], step: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    ///
+    /// What a step of all columns that `run_record` gives leaves of residuals, to first order, and by
+    /// output the squares of changes by θ, by the record's own numbers, and of what is left.
+    #[allow(clippy::too_many_arguments)]
+    fn slope_step<'py>(
+        &self,
+        py: Python<'py>,
+        values: RowMajor1<'_, f64>,
+        free: Vec<usize>,
+        record: Flown<'_>,
+        own: Own<'_>,
+        hold: &str,
+        left: RowMajor2<'py, f64>,
+        step: RowMajor1<'py, f64>,
+    ) -> PyResult<output_error::Stepped<'py>> {
+        let values = values.as_slice()?;
+        let records = [record];
+        let trajectories = linear(
+            TransferFamily::new(&self.functions, &self.pairs, values, &free),
+            &records,
+            hold,
+        )?;
+        let data = record_data(&records, vec![own])?;
+        let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();
+        output_error::slope_step(py, &trajectories, &data[0], &theta, left, step)
+    }
 }
 
 /// Add this file's names to the module.

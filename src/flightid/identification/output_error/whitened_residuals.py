@@ -11,6 +11,7 @@ from functools import partial
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid._native import left_of_neighbours
 from flightid.uncertainty.lagged_products import lagged_products, products_with_past
 from flightid.uncertainty.triangle import triangle_of_parts
 
@@ -65,10 +66,7 @@ def unforetold(rows: Sequence[Array], inputs: Sequence[Array]) -> list[Array]:
         weights, _ = _regressed(beside, None, count, ROUNDING)
     else:
         weights = _of_directions(products, count)
-    left = [each.copy() for each in rows]
-    for k, part, lags in pieces():
-        left[k][:, part] -= weights @ lags
-    return left
+    return [left_of_neighbours(*pair, weights) for pair in zip(rows, padded, strict=True)]
 
 
 def colour_filters(rows: Sequence[Array]) -> list[Array] | None:
