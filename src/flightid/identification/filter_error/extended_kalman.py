@@ -7,6 +7,7 @@ measurement and constants of channels at zero, both with a wide prior in place o
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,6 @@ from flightid.errors import FlightidError
 from flightid.frozen import dataclass
 from flightid.identification.filter_error.innovations import (
     Filtered,
-    FilteredData,
     InnovationsProblem,
     RecordInnovations,
 )
@@ -25,6 +25,7 @@ from flightid.identification.records.held_model import LinearPoint
 from flightid.models import StateSpaceModel
 from flightid.models.state_space.first_sample import first_outputs, measured_point
 from flightid.models.state_space.integration_steps import steps_per_sample
+from flightid.models.state_space.measured_states import StateOutputs
 from flightid.record import Record
 
 Array = NDArray[np.float64]
@@ -82,17 +83,19 @@ class ExtendedProblem(InnovationsProblem):
             reference=problem.reference, substeps=tuple(substeps), state_scale=state_scale,
         )  # fmt: skip
 
+    @cached_property
+    def _seen(self) -> list[StateOutputs]:
+        """What each record's first sample tells of its states: the same for all unknowns."""
+        return [first_outputs(self.model, each.inputs, each.outputs) for each in self.data]
+
     def records(self, unknowns: Array, *, with_slopes: bool) -> list[Filtered]:
         """Innovations of every record; slopes come with `residuals` alone."""
         del with_slopes
-        return [
-            (self._found(each, steps, unknowns), None)
-            for each, steps in zip(self.data, self.substeps, strict=True)
-        ]
+        return [(self._found(place, unknowns), None) for place in range(len(self.data))]
 
-    def _found(self, data: FilteredData, steps: int, unknowns: Array) -> RecordInnovations:
+    def _found(self, place: int, unknowns: Array) -> RecordInnovations:
         """One record as it is kept."""
-        given, (p, n_samples) = self._given(data, steps, unknowns), data.outputs.shape
+        given, (p, n_samples) = self._given(place, unknowns), self.data[place].outputs.shape
         start, prior, shifted, _ = given[-2]
         (innovations, triangles, states), _ = _native.extended_filter(*given)
         n = len(self.model.states)
@@ -109,13 +112,13 @@ class ExtendedProblem(InnovationsProblem):
             SteadyFilter(np.eye(n), np.zeros((n, p)), np.zeros((p, n)), usual, prior[:n, :n]),
         )
 
-    def _given(self, data: FilteredData, steps: int, unknowns: Array) -> _Given:
+    def _given(self, place: int, unknowns: Array) -> _Given:
         """What the native filter takes of one record."""
+        data, seen = self.data[place], self._seen[place]
         process, variance = self.noise(unknowns)
         n, (m, _), (p, _) = len(self.model.states), data.inputs.shape, data.outputs.shape
         shifted = list(range(m)) if self.input_bias else []
         biased = list(range(p)) if self.output_bias else []
-        seen = first_outputs(self.model, data.inputs, data.outputs)
         start = np.zeros(n + len(shifted) + len(biased))
         start[:n] = seen.states(data.outputs[:, :1])[:, 0]
         prior = np.zeros((len(start), len(start)))
@@ -132,12 +135,12 @@ class ExtendedProblem(InnovationsProblem):
             self._values(unknowns),
             np.ascontiguousarray(data.inputs),
             np.ascontiguousarray(data.outputs.T),
-            (data.sample_time_s, self.hold, steps),
+            (data.sample_time_s, self.hold, self.substeps[place]),
             (start, prior, shifted, biased),
             (process, variance),
         )
 
-    def _ahead(self, data: FilteredData, given: _Given) -> tuple[Array, Array, Array, Array]:
+    def _ahead(self, seen: StateOutputs, given: _Given) -> tuple[Array, Array, Array, Array]:
         """How values, prior, densities and variances change with each unknown."""
         (_, prior, _, _), (process, variance) = given[-2:]
         count, n, p = self.n_all, len(process), len(variance)
@@ -147,7 +150,6 @@ class ExtendedProblem(InnovationsProblem):
         for place, state in enumerate(self.noisy, self.n_free):
             densities[place, state] = 2.0 * process[state]
         begun = np.zeros((count, *prior.shape))
-        seen = first_outputs(self.model, data.inputs, data.outputs)
         for place, output in enumerate(self.measured, self.n_free + len(self.noisy)):
             variances[place, output] = 2.0 * variance[output]
             begun[place, :n, :n] = WIDE * seen.noise(np.diag(variances[place]))
@@ -163,13 +165,13 @@ class ExtendedProblem(InnovationsProblem):
         total = sum(each.outputs.size for each in self.data)
         white, logs, turned, moved = [], [], [], []
         try:
-            for each, steps in zip(self.data, self.substeps, strict=True):
-                given = self._given(each, steps, unknowns)
+            for place, seen in enumerate(self._seen):
+                given = self._given(place, unknowns)
                 _, (found, log) = _native.extended_filter(*given)
                 white.append(found.ravel())
                 logs.append(log)
                 if with_slopes:
-                    slopes = _native.extended_filter_slopes(*given, self._ahead(each, given))
+                    slopes = _native.extended_filter_slopes(*given, self._ahead(seen, given))
                     turned.append(slopes[0])
                     moved.append(slopes[1])
         except (FlightidError, np.linalg.LinAlgError):

@@ -7,6 +7,8 @@ rest.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -40,7 +42,7 @@ class StateOutputs:
     offset: Array
     trim: Array
 
-    @property
+    @cached_property
     def weights(self) -> Array:
         """Least-squares inverse of H, shape (n_states, n_direct)."""
         return np.asarray(np.linalg.pinv(self.matrix))
