@@ -27,7 +27,7 @@ from flightid.inspection.excitation_found import injected_spans
 from flightid.inspection.rate_chirps import chirps
 from flightid.inspection.saturation import saturations
 from flightid.inspection.verdicts import _at_limit
-from flightid.logs.blackbox.settings import settings_of
+from flightid.logs.blackbox.settings import loop_step_s, settings_of
 from flightid.plot.tuning import gain_map
 from flightid.review.loops import loop_responses
 from tests import betaflight_flight as betaflight
@@ -308,6 +308,14 @@ def test_a_log_of_every_loop_tells_its_hold(tmp_path: Path) -> None:
     for denominator, hold in (("2", "zero"), ("1", None)):
         path.write_bytes(blackbox(columns, {**SETTINGS, "pid_process_denom": denominator}))
         assert fid.read_log(path).record().hold == hold
+    # A controller acts in every loop of the gyro, or in each of so many.
+    for settings, step_s in (
+        ({}, None), ({"looptime": 0.0}, None), ({"looptime": 125.0}, 125e-6),
+        ({"looptime": 125.0, "pid_process_denom": 0.0}, 125e-6),
+        ({"looptime": 125.0, "pid_process_denom": 1.0}, 125e-6),
+        ({"looptime": 125.0, "pid_process_denom": 4.0}, 500e-6),
+    ):  # fmt: skip
+        assert loop_step_s(settings) == (step_s and pytest.approx(step_s, rel=1e-12))
 
 
 def test_a_command_at_the_limit_of_its_axis_has_a_finding_of_its_own(tmp_path: Path) -> None:

@@ -75,6 +75,17 @@ def test_flights_that_are_others_are_not() -> None:
     assert not judge_copies([*cuts, _flown(2), _flown(3)], ["p"])
 
 
+def test_outputs_that_one_record_lacks_are_not_compared() -> None:
+    time_s, rows = np.arange(300) * STEP_S, np.random.default_rng(6).standard_normal((3, 2, 300))
+    rows[:, 1] = rows[0, 1]
+    flights = [fid.Record.from_arrays(time_s, outputs={"p": p, "q": q}) for p, q in rows]
+    assert judge_copies(flights, ["q"])
+    for place in range(3):
+        bare = fid.Record.from_arrays(time_s, outputs={"p": rows[place, 0]})
+        told = [*flights[:place], bare, *flights[place + 1 :]]
+        assert not judge_copies(told, ["p", "q"])
+
+
 def test_rest_is_no_copy() -> None:
     time_s = np.arange(400) * 0.02
     still = np.round(np.where(time_s > 4.0, np.sin(3.0 * time_s**2), 0.0), 1)

@@ -16,9 +16,10 @@ from flightid.identification.output_error import distinct
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.records.options import RecordOptions
 from flightid.identification.records.setup import prepare_records
-from flightid.uncertainty import residual_noise, taken_noise
+from flightid.uncertainty import fitted_directions, residual_noise, taken_noise
 from flightid.uncertainty.fitted_directions import (
     FittedDirections,
+    lags_of_form,
     slow_transforms,
 )
 from flightid.uncertainty.residual_noise import Autoregression, noise_models
@@ -46,6 +47,20 @@ def _directions(lengths: tuple[int, ...], n_outputs: int, m: int, k: int) -> lis
         FittedDirections(each, part.reshape(n_outputs, -1, k))
         for each, part in zip(own, parts, strict=True)
     ]
+
+
+def test_lags_reach_beyond_rows_that_are_turned_together(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(fitted_directions, "AT_ONCE", 9)
+    random = np.random.default_rng(2)
+    form = random.standard_normal((3, 3))
+    form = form + form.T
+    for n in (1, 7, 9, 12, 18, 19, 30):
+        columns = random.standard_normal((n, 3))
+        among = columns @ form @ columns.T
+        for n_lags in (1, 2, 6):
+            found = lags_of_form(columns, form, n_lags)
+            wanted = [np.trace(among, offset=lag) for lag in range(n_lags)]
+            assert_close(found, wanted, atol=1e-10, why="the sum written out")
 
 
 @pytest.mark.parametrize("at_once", [taken_noise.AT_ONCE, 9])

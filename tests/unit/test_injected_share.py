@@ -11,7 +11,11 @@ import pytest
 import flightid as fid
 from flightid.conventions import Light
 from flightid.inspection.carried import carried_axes
+from flightid.inspection.excitation_found import FoundExcitation
+from flightid.inspection.injected import InjectedShare, injected_share
+from flightid.inspection.signals import Signal
 from flightid.inspection.usable_band import LOOP_ALONE
+from tests.handmade_log import HandmadeLog
 from tests.strangers import inspected_logs
 
 
@@ -39,3 +43,46 @@ def test_a_sweep_beyond_the_gusts_is(tmp_path: Path) -> None:
     random = np.random.default_rng([0, 1215])
     inspected_logs.write(inspected_logs.sound(random), random, tmp_path / "swept.bin")
     assert carried_axes(fid.inspect_log(tmp_path / "swept.bin")) == ("roll",)
+
+
+STEP_S = 0.02
+
+
+def _share(injected: np.ndarray, rate: np.ndarray, **asked: float) -> InjectedShare | None:
+    """Of a run of 100 s, logged for longer."""
+    stamps = 5.0 + STEP_S * np.arange(injected.size)
+    log = HandmadeLog("ardupilot").with_table("SIDD", stamps, Targ=injected)
+    runs = [
+        FoundExcitation(kind, axis, 10.0, 10.0 + asked.get("long_s", 100.0), "")
+        for kind, axis in (("sid", "roll"), ("sweep", "pitch"), ("sid", "yaw"))
+    ]
+    motion = Signal("p", stamps, rate, "rad/s", "R")
+    return injected_share(log.log, "roll", runs, motion, asked.get("highest", np.inf))
+
+
+def test_a_rate_is_coherent_where_the_injection_moves_it() -> None:
+    """White noise is injected, of which the rate holds what lies below 3 Hz, and noise above."""
+    random = np.random.default_rng(4)
+    injected, other = random.standard_normal((2, 6000))
+    hertz = np.fft.rfftfreq(6000, STEP_S)
+    both = np.where(hertz < 3.0, np.fft.rfft(injected), np.fft.rfft(other))
+    rate = np.fft.irfft(both, 6000)
+    lowest = 2.0 / 25.0  # Two cycles in a quarter of the run.
+    found = _share(injected, rate)
+    assert found is not None
+    assert found.width == pytest.approx(3.0 / lowest, rel=0.15)
+    assert 0.95 < found.largest <= 1.0
+    cut = _share(injected, rate, highest=2.0 * np.pi * 1.0)
+    assert cut is not None
+    assert cut.width == pytest.approx(1.0 / lowest, rel=0.01)
+    alone = _share(injected, other)
+    assert alone is not None
+    assert alone.largest < 0.6
+    assert alone.width == 1.0
+    # Nothing injected tells nothing; a rate that rests tells that it was not moved.
+    assert _share(0.0 * injected, rate) is None
+    still = _share(injected, 0.0 * rate)
+    assert still is not None
+    assert (still.width, still.largest) == (1.0, 0.0)
+    assert _share(injected, rate, highest=0.5) is None
+    assert _share(injected, rate, long_s=62.9 * STEP_S, highest=99.0) is None

@@ -15,6 +15,7 @@ from flightid.conventions import Light
 from flightid.evidence import inspection_check, sweep_check
 from flightid.findings import Finding
 from flightid.inspection import advice, thresholds
+from flightid.inspection import skew as stream_skew
 from flightid.inspection.excitation_found import FoundExcitation, _plain, _shape, _steps, _sweep
 from flightid.inspection.flight_phases import FlightPhases
 from flightid.inspection.gap_findings import _remedy
@@ -72,6 +73,21 @@ def skew(
     found = _skew("p", first, second, ((0.0, seconds),))
     assert found is not None
     return found
+
+
+def test_a_lag_is_at_the_top_of_a_parabola_and_in_the_middle_of_a_flat_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def found(left: float, right: float) -> float:
+        near = {20: 0.99, 19: left, 21: right}
+        monkeypatch.setattr(stream_skew, "_about_the_best", lambda *_: near)
+        return skew(0.02, 50.0, 20.0, noise=0.1).lag_s
+
+    middle, step = found(0.98, 0.98), 2.0 * (found(0.98, 0.99) - found(0.98, 0.98))
+    assert abs(step) > 1e-5
+    assert found(0.99, 0.99) == middle
+    assert_close(found(0.97, 0.98) - middle, step / 6.0, rtol=1e-9, why="through three points")
+    assert_close(found(0.98, 0.97) - middle, -step / 6.0, rtol=1e-9, why="through three points")
 
 
 def test_a_lag_has_an_interval_and_is_told_only_where_the_streams_tell_it() -> None:

@@ -164,6 +164,15 @@ def test_chances_do_not_depend_on_units() -> None:
             assert known is not None
             assert 0.0 < known < 1.0
             assert chance([each.along(scaled) for each in parts], freedom) == pytest.approx(known)
+    # Scores of exactly one set of numbers leave a square of rounding, of either sign.
+    for true in rng.standard_normal((20, 3)):
+        exact = [
+            RecordParts(scored[None], square[None], square[None, :, None])
+            for square in (root @ root.T + np.eye(3) for root in roots)
+            for scored in [square @ true]
+        ]
+        for freedom in (np.inf, 20.0):
+            assert chance_alike(exact, freedom) == pytest.approx(1.0, abs=1e-6)
     one = np.array([[2.0, 0.3], [0.3, 1.0]])
     other = np.array([[1.0, 0.0], [0.0, 3.0]])
     both = larger(one, other)

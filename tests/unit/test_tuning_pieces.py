@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from flightid.control.tuning import evidence
 from flightid.control.tuning.controller_options import ControllerOptions
 from flightid.control.tuning.filter_choice import AxisFilters, FilterChoice, _cutoffs
 from flightid.control.tuning.gain_search import CHUNK, _chunks, _Space, _starts
 from flightid.control.tuning.gain_steps import TunedGain, reached
 from flightid.control.tuning.requirements import TuningRequirements
+from flightid.control.tuning.responses import BELOW_NYQUIST, LIKE_ZERO, _pulses
 from flightid.control.tuning.sampled_plants import SampledPlants, loop_grid
 from flightid.control.tuning.standing_error import judge_standing, slow_gain, standing_errors
 from flightid.control.tuning.tune_controller import _gains_given, _loop, _scaled, _sign, _turn
@@ -205,6 +207,43 @@ def test_what_a_loop_without_an_integrator_leaves_of_a_step() -> None:
     loop.values = {"p": 2.0, "i": 0.1}
     assert standing_errors(loop, [lag, twice], "y", "u").tolist() == [0.0, 0.0]
     assert judge_standing(loop, lag, [], "y", "u") == []
+
+
+def test_corners_are_those_of_what_is_known_and_makes_sense(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def steps(scale: float) -> Any:
+        yield scale, -scale
+        yield "late", 2.0 * scale
+        raise ModelError("no further", found="", needed="")
+
+    def linear(each: Any, step: float) -> Any:
+        if each == "late":
+            raise ModelError("a negative delay", found=-1, needed="≥ 0")
+        return each, step
+
+    monkeypatch.setattr(evidence, "_linear", linear)
+    for known, corners in ((True, [1.0, -1.0, 2.0]), (False, [])):
+        uncertain: Any = SimpleNamespace(known=known, steps=steps)
+        found = [*evidence._corners(uncertain, 0.01)]
+        assert found == [(evidence.CORNER * each, 0.01) for each in corners]
+
+
+def test_pulses_are_asked_from_nearly_rest_to_nearly_half_the_sampling() -> None:
+    asked: list[Any] = []
+
+    def axis(omega: Any, _: Any) -> Any:
+        asked.append(omega)
+        raise ModelError("enough", found="", needed="")
+
+    plants = SimpleNamespace(sample_time_s=0.01)
+    closed: Any = SimpleNamespace(place=0, gyro="raw", plants=plants, axis=axis)
+    for count in (8, 64):
+        with pytest.raises(ModelError):
+            next(_pulses(closed, [], count))
+        wanted = np.linspace(0.0, np.pi / 0.01, count // 2 + 1)
+        wanted[0], wanted[-1] = LIKE_ZERO * wanted[1], BELOW_NYQUIST * wanted[-1]
+        assert_close(asked.pop(), wanted, rtol=1e-12, why="rounding")
 
 
 def test_a_rate_that_answers_the_wrong_way_after_015_s_is_refused() -> None:

@@ -145,8 +145,8 @@ def _bends(rows: Sequence[Array]) -> list[NDArray[np.int64]]:
     count = sum(each.shape[1] for each in bends)
     power = sum(np.sum(np.square(each), axis=1) for each in bends)
     unit = SAME * np.sqrt(np.maximum(power / max(count, 1), np.finfo(float).tiny))[:, None]
-    limit = float(2**52)
-    return [np.rint(np.clip(each / unit, -limit, limit)).astype(np.int64) for each in bends]
+    # None is more units than the root of their count over `SAME`: they are whole numbers.
+    return [np.rint(each / unit).astype(np.int64) for each in bends]
 
 
 def _stretches(bends: NDArray[np.int64]) -> tuple[Words, NDArray[np.bool_]]:

@@ -117,5 +117,6 @@ def loop_step_s(settings: Mapping[str, float]) -> float | None:
         `looptime` is that of the gyro, in µs; of INAV, that of the controller itself.
     """
     gyro_us = settings.get("looptime", 0.0)
-    denominator = max(settings.get("pid_process_denom", 1.0), 1.0)
+    several = settings.get("pid_process_denom")
+    denominator = 1.0 if several is None else max(several, 1.0)
     return gyro_us * denominator / 1e6 if gyro_us > 0.0 else None
