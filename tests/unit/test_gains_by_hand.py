@@ -157,6 +157,13 @@ def test_an_unstable_loop_is_called_that_and_its_margins_are_no_shares(by_hand: 
     said = verdict(unstable, np.zeros(3, bool), 3).message
     assert said.endswith(": some plant is unstable with them")
     assert "%" not in said
+    # So many of as many bound the share of all that are like them: 0.05 to the power of 1 / n.
+    good = GainSearchResult(np.ones(3), True, ("range of P",), {"stability": 2.0}, by_hand)
+    for count in (10, 58, 59, 300):
+        said = verdict(good, np.ones(count, bool), count).message
+        share = np.floor(1000.0 * 0.05 ** (1.0 / count)) / 10.0
+        assert f"{count} of {count} fresh plants" in said
+        assert f": at least {share:.1f} % of those that the data allow (95 % confidence)" in said
 
 
 def test_gains_by_hand_that_no_axis_has_are_refused_by_name(fit: fid.Fit) -> None:

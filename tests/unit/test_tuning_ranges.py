@@ -11,7 +11,7 @@ import pytest
 import flightid as fid
 from flightid.control.autopilots import axis_loop
 from flightid.control.tuning.controller_paths import ControllerPaths
-from flightid.control.tuning.findings import low_coherence
+from flightid.control.tuning.findings import _behind_rate_loop, low_coherence
 from flightid.control.tuning.flown_gains import require_known
 from flightid.control.tuning.gain_steps import reached
 from flightid.errors import OptionError
@@ -91,6 +91,9 @@ def test_a_rate_loop_makes_up_for_what_an_angle_loop_was_not_shown() -> None:
         found = SimpleNamespace(exists=True, gains=np.ones(2))
         measured = SimpleNamespace(omega_rad_s=omega, coherence=0.3 + 0.0 * omega)
         result = SimpleNamespace(found=found, worst_cases=[case], problem=problem)
+        known = _behind_rate_loop(result, omega, measured.coherence)
+        left = omega**2 / (omega**2 + 36.0)
+        assert known == pytest.approx(0.3 / (0.3 + 0.7 * left), rel=1e-9)
         return [each.message for each in low_coherence(result, measured)]
 
     assert said(2.0, "angle loop") == []
