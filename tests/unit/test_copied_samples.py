@@ -73,9 +73,7 @@ def test_flights_that_are_others_are_not() -> None:
     record = _flown()
     cuts = [record.segment(0.0, 4.99), record.segment(5.0, 10.0)]
     assert not judge_copies([*cuts, _flown(2), _flown(3)], ["p"])
-
-
-def test_outputs_that_one_record_lacks_are_not_compared() -> None:
+    # Outputs that one record lacks are not compared.
     time_s, rows = np.arange(300) * STEP_S, np.random.default_rng(6).standard_normal((3, 2, 300))
     rows[:, 1] = rows[0, 1]
     flights = [fid.Record.from_arrays(time_s, outputs={"p": p, "q": q}) for p, q in rows]

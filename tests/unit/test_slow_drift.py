@@ -41,6 +41,22 @@ def test_columns_are_squared_by_the_covariance_of_recursion_and_drift() -> None:
     columns = np.random.default_rng(0).standard_normal((60, 3))
     exact = columns.T @ toeplitz(noise.autocovariance(60)) @ columns
     assert_close(noise.squared(columns), exact, why="the same sums", rtol=1e-11)
+    # What rings on, by SciPy's equation; where squares lose their digits it is sent through.
+    for poles, is_told in (
+        ([0.5], True), ([0.9, -0.3], True), ([0.99, 0.5, 0.2], True), ([0.0, 0.0], True),
+        ([0.9999, 0.99989, 0.99988, 0.99987], False),
+    ):  # fmt: skip
+        denominator = np.poly(poles)
+        order = denominator.size - 1
+        turn = np.eye(order, k=1)
+        turn[:, 0] -= denominator[1:]
+        first = np.zeros((order, order))
+        first[0, 0] = 1.0
+        found = _ringing(denominator)
+        assert (found is not None) == is_told, poles
+        if found is not None:
+            wanted = solve_discrete_lyapunov(turn.T, first)
+            assert_close(found, wanted, rtol=1e-8, atol=1e-12, why="doubling")
 
 
 def test_a_recursion_of_poles_that_lie_together_rings_on_as_long_as_it_does() -> None:
@@ -198,22 +214,3 @@ def test_first_lags_of_a_long_periodogram_are_those_of_the_samples(length: int) 
     power = np.abs(np.fft.rfft(values, length)) ** 2
     wanted = np.array([float(values[k:] @ values[: n - k]) for k in range(21)])
     assert_close(first_lags(power, length, 20), wanted, rtol=1e-14, why="Wiener and Khinchin")
-
-
-def test_what_rings_on_is_that_of_the_equation_of_powers() -> None:
-    """By SciPy's equation; where squares lose their digits it is sent through instead."""
-    for poles, is_told in (
-        ([0.5], True), ([0.9, -0.3], True), ([0.99, 0.5, 0.2], True), ([0.0, 0.0], True),
-        ([0.9999, 0.99989, 0.99988, 0.99987], False),
-    ):  # fmt: skip
-        denominator = np.poly(poles)
-        order = denominator.size - 1
-        turn = np.eye(order, k=1)
-        turn[:, 0] -= denominator[1:]
-        first = np.zeros((order, order))
-        first[0, 0] = 1.0
-        found = _ringing(denominator)
-        assert (found is not None) == is_told, poles
-        if found is not None:
-            wanted = solve_discrete_lyapunov(turn.T, first)
-            assert_close(found, wanted, rtol=1e-8, atol=1e-12, why="doubling")
