@@ -3,12 +3,16 @@
 //! uncertainty/unequal_noise.py, responses/windows/transform.py)
 
 use flightid_core::frequency_domain::composite::{CompositeRule, composite as core_composite};
-use flightid_core::numerics::folded_frames::{Frames, folded_frames as folded};
+use flightid_core::numerics::folded_frames::folded_frames as folded;
+use flightid_core::numerics::folded_rows::{Frames, Ladder, Piece};
+use flightid_core::numerics::half_band::HalfBand;
 use flightid_core::numerics::levinson::weights as levinson;
 use flightid_core::numerics::rank_bounds::rank_bound;
 use flightid_core::numerics::ranks::ranks as ranked;
 use flightid_core::numerics::slow_drift::{Parts, Rounds, Spectrum};
-use numpy::{IntoPyArray, PyArray1, PyUntypedArrayMethods};
+use numpy::{
+    IntoPyArray, PyArray1, PyArray2, PyArrayMethods, PyReadwriteArray1, PyUntypedArrayMethods,
+};
 use pyo3::prelude::*;
 
 use crate::error::from_core;
@@ -102,22 +106,63 @@ fn drift_likelihood(
     py.detach(|| spectrum.likelihood(&parts, corner, sharpest)).map_err(from_core)
 }
 
-/// folded_frames(samples: NDArray[np.float64], length: int, hop: int, width: int) -> list[NDArray[np.float64]]
+/// folded_frames(records: list[NDArray[np.float64]], halves: list[tuple[NDArray[np.float64], NDArray[np.float64]]], windows: list[tuple[int, int]], frames: tuple[int, int], begun: NDArray[np.float64], step: NDArray[np.float64], rows: list[tuple[NDArray[np.float64], NDArray[np.float64]]]) -> None
 ///
 /// Even parts of windows of channels by distance from their middles, and odd ones with the sign of
-/// exp(−jωd): windows slowest, channels within each, zeros up to the width of a row.
+/// exp(−jωd), into `rows`: at the first level's samples and at half as many in each that follows,
+/// records slowest, then windows, channels within each. `halves` are the records' by `halved` with
+/// `begun`, or none without weights; `windows` each record's first and how many, `frames` their
+/// samples and those between starts.
 #[pyfunction]
-fn folded_frames<'py>(
+#[expect(clippy::too_many_arguments, reason = "records, windows, what is made of them, and where")]
+fn folded_frames(
+    py: Python<'_>,
+    records: Vec<RowMajor2<'_, f64>>,
+    halves: Vec<(RowMajor2<'_, f64>, RowMajor2<'_, f64>)>,
+    windows: Vec<(usize, usize)>,
+    frames: (usize, usize),
+    begun: RowMajor1<'_, f64>,
+    step: RowMajor1<'_, f64>,
+    mut rows: Vec<(PyReadwriteArray1<'_, f64>, PyReadwriteArray1<'_, f64>)>,
+) -> PyResult<()> {
+    let frames = Frames { length: frames.0, hop: frames.1 };
+    let bands = (HalfBand::new(begun.as_slice()?), HalfBand::new(step.as_slice()?));
+    let begun = (!begun.as_slice()?.is_empty()).then_some(&bands.0);
+    let ladder = Ladder { begun, step: &bands.1, levels: rows.len() };
+    let mut pieces = Vec::with_capacity(records.len());
+    for (at, (record, &(first, count))) in records.iter().zip(&windows).enumerate() {
+        let halves = match halves.get(at) {
+            Some((even, odd)) => [even.as_slice()?, odd.as_slice()?],
+            None => [&[][..]; 2],
+        };
+        let (samples, n) = (record.as_slice()?, record.shape()[1]);
+        pieces.push(Piece { samples, n, halves, first, count });
+    }
+    let mut found = Vec::with_capacity(rows.len());
+    for (even, odd) in &mut rows {
+        found.push([even.as_slice_mut()?, odd.as_slice_mut()?]);
+    }
+    py.detach(|| folded(&pieces, frames, ladder, &mut found)).map_err(from_core)
+}
+
+/// halved(samples: NDArray[np.float64], parity: int, weights: NDArray[np.float64]) -> NDArray[np.float64]
+///
+/// Channels at places of even (0) or odd (1) number, those between weighed onto them: by `weights`,
+/// nearest neighbours first.
+#[pyfunction]
+fn halved<'py>(
     py: Python<'py>,
     samples: RowMajor2<'_, f64>,
-    length: usize,
-    hop: usize,
-    width: usize,
-) -> PyResult<[Bound<'py, PyArray1<f64>>; 2]> {
-    let (n, frames) = (samples.shape()[1], Frames { length, hop, width });
-    let samples = samples.as_slice()?;
-    let found = py.detach(|| folded(samples, n, frames)).map_err(from_core)?;
-    Ok(found.map(|each| each.into_pyarray(py)))
+    parity: bool,
+    weights: RowMajor1<'_, f64>,
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
+    let (shape, band) = (samples.shape(), HalfBand::new(weights.as_slice()?));
+    let (channels, parity) = (shape[0], usize::from(parity));
+    let width = (shape[1] + 1).saturating_sub(parity) / 2;
+    let rows = samples.as_slice()?.chunks_exact(shape[1].max(1));
+    let mut found = Vec::with_capacity(channels * width);
+    py.detach(|| rows.for_each(|row| found.extend_from_slice(&band.halved(row, parity))));
+    found.into_pyarray(py).reshape([channels, width])
 }
 
 /// ranks(row: NDArray[np.float64]) -> NDArray[np.float64]
@@ -155,6 +200,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(drift_beside, module)?)?;
     module.add_function(wrap_pyfunction!(drift_likelihood, module)?)?;
     module.add_function(wrap_pyfunction!(folded_frames, module)?)?;
+    module.add_function(wrap_pyfunction!(halved, module)?)?;
     module.add_function(wrap_pyfunction!(rank_bounds, module)?)?;
     module.add_function(wrap_pyfunction!(ranks, module)?)?;
     module.add_function(wrap_pyfunction!(autoregression_weights, module)?)

@@ -1,36 +1,60 @@
-//! Overlapped frames of channels, folded about their middles.
+//! Overlapped frames of channels, folded about their middles, at all samples and at fewer of them.
 //! (Python side: `responses/windows/transform.py`)
 
+use super::folded_rows::{Frames, Ladder, Piece, RowMaker};
+use super::half_band::HalfBand;
 use super::widest::widest;
 use crate::error::CoreError;
 
-/// Windows of a record.
-#[derive(Clone, Copy, Debug)]
-pub struct Frames {
-    /// Samples in a window, an even number.
-    pub length: usize,
-    /// Samples from the start of one window to that of the next.
-    pub hop: usize,
-    /// Numbers in a folded row: length / 2 + 1 at least, zeros behind them.
-    pub width: usize,
-}
-
-/// Even and odd parts of the windows of channels of `n` samples each, by distance from the middle:
-/// windows slowest and channels within each. Odd parts have the sign of `exp(−jωd)`.
+/// Even and odd parts of windows about their middles by level, x(d) + x(−d) and x(−d) − x(d) at
+/// distances d of a level's step, into rows that are there: pieces slowest, then windows, and channels
+/// within each. The even part of the middle itself is twice what it holds.
 ///
 /// # Errors
-/// `CoreError::Shape` where channels are no whole number of `n` samples, a window has no middle or
-/// a row no room for it.
+/// `CoreError::Shape` where channels are no whole number of samples, a window has no middle or lies
+/// outside its record, halves are not those of the samples, windows too short for them, or rows too few.
 pub fn folded_frames(
-    samples: &[f64],
-    n: usize,
+    pieces: &[Piece<'_>],
     frames: Frames,
-) -> Result<[Vec<f64>; 2], CoreError> {
-    let Frames { length, hop, width } = frames;
-    let (half, found) = (length / 2, samples.len());
-    if n == 0 || !found.is_multiple_of(n) {
-        return Err(CoreError::Shape { what: "samples of channels", found, needed: n });
+    ladder: Ladder<'_>,
+    found: &mut [[&mut [f64]; 2]],
+) -> Result<(), CoreError> {
+    check(frames, ladder)?;
+    let mut rows = 0;
+    for piece in pieces {
+        check_piece(piece, frames, ladder.begun.is_some())?;
+        rows += piece.count * (piece.samples.len() / piece.n);
     }
+    let widths = ladder.widths(frames.length);
+    if found.len() != widths.len() {
+        let (found, needed) = (found.len(), widths.len());
+        return Err(CoreError::Shape { what: "levels of rows", found, needed });
+    }
+    for (found, width) in found.iter().zip(widths) {
+        let (found, needed) = (found[0].len().min(found[1].len()), rows * width);
+        if found < needed {
+            return Err(CoreError::Shape { what: "rows of a level", found, needed });
+        }
+    }
+    let mut maker = RowMaker::new(frames, ladder);
+    let mut row = 0;
+    for piece in pieces {
+        for window in piece.first..piece.first + piece.count {
+            for channel in 0..piece.samples.len() / piece.n {
+                widest(
+                    #[inline(always)]
+                    || maker.push(piece, [channel, window, row], found),
+                );
+                row += 1;
+            }
+        }
+    }
+    Ok(())
+}
+
+fn check(frames: Frames, ladder: Ladder<'_>) -> Result<(), CoreError> {
+    let Frames { length, hop } = frames;
+    let half = length / 2;
     if half == 0 || length != 2 * half || hop == 0 {
         return Err(CoreError::Shape {
             what: "samples of a window",
@@ -38,74 +62,39 @@ pub fn folded_frames(
             needed: 2 * half,
         });
     }
-    if width <= half {
-        return Err(CoreError::Shape { what: "a folded row", found: width, needed: half + 1 });
+    let reach = ladder.begun.map_or(0, HalfBand::reach);
+    if half < reach {
+        return Err(CoreError::Shape { what: "half a window", found: half, needed: reach });
     }
-    let windows = if n < length { 0 } else { (n - length) / hop + 1 };
-    let many = windows * (found / n) * width;
-    let (mut even, mut odd) = (Vec::with_capacity(many), Vec::with_capacity(many));
-    let (mut sums, mut differences) = (vec![0.0; width], vec![0.0; width]);
-    for window in 0..windows {
-        for channel in samples.chunks_exact(n) {
-            let frame = &channel[window * hop..window * hop + length];
-            widest(
-                #[inline(always)]
-                || fold(frame, &mut sums, &mut differences),
-            );
-            even.extend_from_slice(&sums);
-            odd.extend_from_slice(&differences);
-        }
+    if ladder.levels == 0 {
+        return Err(CoreError::Shape { what: "rows of a frame", found: 0, needed: 1 });
     }
-    Ok([even, odd])
+    Ok(())
 }
 
-/// Even part of a frame by distance from its middle, and its odd part turned round.
-#[inline(always)]
-fn fold(frame: &[f64], even: &mut [f64], odd: &mut [f64]) {
-    let half = frame.len() / 2;
-    let (left, right) = frame.split_at(half);
-    // The window's first sample stands alone: its mirror image is the next window's first.
-    (even[0], odd[0]) = (right[0], 0.0);
-    (even[half], odd[half]) = (left[0], left[0]);
-    let sides = left[1..].iter().rev().zip(&right[1..]);
-    for ((e, o), (l, r)) in even[1..half].iter_mut().zip(&mut odd[1..half]).zip(sides) {
-        (*e, *o) = (r + l, l - r);
+fn check_piece(piece: &Piece<'_>, frames: Frames, halved: bool) -> Result<(), CoreError> {
+    let (n, found) = (piece.n, piece.samples.len());
+    if n == 0 || !found.is_multiple_of(n) {
+        return Err(CoreError::Shape { what: "samples of channels", found, needed: n });
     }
+    if piece.count == 0 {
+        return Ok(());
+    }
+    let needed = (piece.first + piece.count - 1) * frames.hop + frames.length;
+    if n < needed {
+        return Err(CoreError::Shape { what: "samples of windows", found: n, needed });
+    }
+    for (parity, half) in piece.halves.iter().enumerate() {
+        let needed = (n + 1 - parity) / 2 * (found / n);
+        let asked = (piece.first..piece.first + piece.count.min(2))
+            .any(|window| (window * frames.hop + frames.length / 2) % 2 == parity);
+        if halved && asked && half.len() != needed {
+            return Err(CoreError::Shape { what: "halved samples", found: half.len(), needed });
+        }
+    }
+    Ok(())
 }
 
 #[cfg(test)]
-mod tests {
-    use super::{Frames, folded_frames};
-
-    #[test]
-    fn parts_are_sums_and_differences_about_the_middle() {
-        let x: Vec<f64> = (0..26).map(|k| f64::from((k * k + 7 * k) % 97)).collect();
-        // Two channels of 13 samples: windows of 6 at 0, 2, 4 and 6.
-        let frames = Frames { length: 6, hop: 2, width: 5 };
-        let [even, odd] = folded_frames(&x, 13, frames).unwrap();
-        assert_eq!((even.len(), odd.len()), (4 * 2 * 5, 4 * 2 * 5));
-        for window in 0..4 {
-            for channel in 0..2 {
-                let frame = &x[13 * channel + 2 * window..];
-                let at = 5 * (2 * window + channel);
-                let sum = [frame[3], frame[4] + frame[2], frame[5] + frame[1], frame[0], 0.0];
-                let difference = [0.0, frame[2] - frame[4], frame[1] - frame[5], frame[0], 0.0];
-                assert_eq!(even[at..at + 5], sum);
-                assert_eq!(odd[at..at + 5], difference);
-            }
-        }
-    }
-
-    #[test]
-    fn what_is_no_window_is_refused() {
-        let asked =
-            |n, length, hop, width| folded_frames(&[1.0; 8], n, Frames { length, hop, width });
-        assert!(asked(3, 2, 1, 2).is_err());
-        assert!(asked(0, 2, 1, 2).is_err());
-        assert!(asked(4, 3, 1, 2).is_err());
-        assert!(asked(4, 0, 1, 2).is_err());
-        assert!(asked(4, 2, 0, 2).is_err());
-        assert!(asked(4, 4, 1, 2).is_err());
-        assert_eq!(asked(4, 6, 1, 4), Ok([vec![], vec![]]));
-    }
-}
+#[path = "tests/folded_frames.rs"]
+mod tests;

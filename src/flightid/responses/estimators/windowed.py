@@ -17,6 +17,7 @@ from flightid.responses.estimators.conditioned import ConditionalSpectra, condit
 from flightid.responses.estimators.instrument import condition_on_excitation, excitation_projection
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.spectra import Spectra, average_spectra
+from flightid.responses.windows.halving import Halves
 from flightid.responses.windows.planning import valid_windows
 from flightid.responses.windows.samples import Samples
 from flightid.responses.windows.transform import HANN_POWER, FoldedBasis, WindowPlan
@@ -51,10 +52,10 @@ def estimate_windowed(
 ) -> WindowedEstimate:
     """Spectra, conditioning and composite; with excitations in `samples`, by instrument."""
     spectra, parts = [], []
-    n_in = len(samples.inputs)
+    n_in, halves = len(samples.inputs), [Halves(rows) for rows in samples.records]
     for plan in plans:
         basis = FoldedBasis.of(plan, omega * samples.sample_time_s, detrend)
-        one = average_spectra(samples.records, basis, samples.sample_time_s)
+        one = average_spectra(halves, basis, samples.sample_time_s)
         spectra.append(one)
         if samples.excitations:
             part = condition_on_excitation(one, n_in, len(samples.outputs), omega, samples)

@@ -4,11 +4,13 @@ A Hann window is even about its middle, so each frame is folded there: its even 
 and its odd part sines, which halves the work of the matrix product. Every number is the exact
 transform at the frequency that was asked for; no frequency is rounded to a grid of the window.
 
-Slow frequencies do not need every sample: see `panels`. A mean that is removed from each window is
+Slow frequencies do not need every sample: see `halving`. A mean that is removed from each window is
 taken out of the basis instead, once.
 """
 
 from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.lib.stride_tricks import sliding_window_view
@@ -16,13 +18,24 @@ from numpy.typing import NDArray
 
 from flightid import _native
 from flightid.frozen import dataclass
-from flightid.responses.windows.panels import PanelBasis, PanelSpace, exponentials, panel_levels
+from flightid.responses.windows.halving import (
+    Halves,
+    exponentials,
+    halved_rows,
+    halved_weights,
+    level_sizes,
+    stepped_weights,
+)
 
 HANN_POWER = 3.0 / 8.0
 """Mean square of the (periodic) Hann window: what U is in the one-sided spectra."""
 SMALL = 1e-9
 """Sine of half an angle below which a sum over a window is its length."""
+ROWS_AT_ONCE = 1 << 19
+"""Samples of frames that are folded at a time: their rows stay in the cache."""
 Real = NDArray[np.float64]
+Piece = tuple[Halves, int, int]
+"""A record, the number of a first window, and how many."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +73,23 @@ class WindowPlan:
 
 
 @dataclass(frozen=True)
+class LevelBasis:
+    """Tapered cosines and sines of some frequencies on the rows of one level.
+
+    Attributes
+    ----------
+    step : int
+        Samples from one number of a row to the next.
+    cosine, sine : ndarray, shape (n_f, width)
+        Columns belong to distances 0, step, 2 · step … from the middle; half of the middle itself.
+    """
+
+    step: int
+    cosine: Real
+    sine: Real
+
+
+@dataclass(frozen=True)
 class FoldedBasis:
     """Tapered cosines and sines about the middle of a window, for one set of frequencies.
 
@@ -68,49 +98,49 @@ class FoldedBasis:
     plan : WindowPlan
     detrend : {"none", "mean", "line"}
         What is removed from each window by itself.
-    cosine, sine : ndarray, shape (n_f − slow ones, half + 1)
-        Of the fast frequencies; columns belong to distances 0 … length/2 from the middle.
-    slow : tuple of PanelBasis
-        Of the slow frequencies at the head, slowest first; the first level of panels is last.
+    levels : tuple of LevelBasis
+        The finest first, whose frequencies are the fastest; together they are all.
     """
 
     plan: WindowPlan
     detrend: str
-    cosine: Real
-    sine: Real
-    slow: tuple[PanelBasis, ...]
+    levels: tuple[LevelBasis, ...]
 
     @property
     def n_frequencies(self) -> int:
         """All frequencies."""
-        return sum(len(each.cosine) for each in self.slow) + len(self.cosine)
+        return sum(len(each.cosine) for each in self.levels)
 
     @property
     def n_bytes(self) -> int:
         """Memory of its numbers."""
-        parts: list[FoldedBasis | PanelBasis] = [self, *self.slow]
-        return sum(each.cosine.nbytes + each.sine.nbytes for each in parts)
+        return sum(each.cosine.nbytes + each.sine.nbytes for each in self.levels)
+
+    @property
+    def halved(self) -> bool:
+        """Whether its finest rows are those of halved records."""
+        return self.levels[0].step == 2
 
     @classmethod
     def of(cls, plan: WindowPlan, omega: Real, detrend: str = "none") -> FoldedBasis:
         """Basis for `omega` in rad per sample, increasing."""
-        size = plan.length // 2 + 1
         bend = 2.0 * np.pi / plan.length
         level = np.zeros(len(omega))
         if detrend == "mean":
             level = _taper_transform(plan, omega) / plan.length
-        slow, start = [], 0
-        levels = panel_levels(omega + bend, size)
-        width = -(-size // levels[0][0].size) * levels[0][0].size if levels else 0
-        for space, stop in levels:
-            part = slice(start, stop)
-            count = width // space.size
-            slow.append(_on_panels(space, count, omega[part], level[part], bend))
-            start = stop
-        rest = exponentials(omega[start:], size)
-        rest *= 0.5 + 0.5 * np.cos(bend * np.arange(size))
-        cosine = rest.real - level[start:, None]
-        return cls(plan, detrend, cosine, rest.imag.copy(), tuple(slow))
+        highest = omega + bend
+        # Windows with a line of its own each are no record's.
+        halved = detrend != "line" and halved_rows(highest, plan.length)
+        sizes = level_sizes(highest, plan.length, halved=halved)
+        slower = [*(slow for _, _, slow in sizes[1:]), 0]
+        levels = []
+        for (step, width, stop), start in zip(sizes, slower, strict=True):
+            rest = exponentials(step * omega[start:stop], width)
+            rest *= 0.5 + 0.5 * np.cos(step * bend * np.arange(width))
+            cosine = rest.real - level[start:stop, None]
+            cosine[:, 0] *= 0.5
+            levels.append(LevelBasis(step, cosine, rest.imag.copy()))
+        return cls(plan, detrend, tuple(levels))
 
 
 def _taper_transform(plan: WindowPlan, omega: Real) -> Real:
@@ -123,15 +153,6 @@ def _taper_transform(plan: WindowPlan, omega: Real) -> Real:
         safe = np.where(small, 1.0, angle)
         total += weight * np.where(small, 2.0 * half, np.sin(half * safe) / np.tan(0.5 * safe))
     return total
-
-
-def _on_panels(space: PanelSpace, count: int, omega: Real, level: Real, bend: float) -> PanelBasis:
-    """Tapered sinusoids less their level, on the panels of a folded frame."""
-    found: NDArray[np.complex128] = 0.5 * space.sinusoids(omega, count)
-    found += 0.25 * space.sinusoids(omega + bend, count)
-    found += 0.25 * space.sinusoids(omega - bend, count)
-    cosine = found.real - level[:, None] * space.sinusoids(np.zeros(1), count).real
-    return PanelBasis(space, cosine, found.imag.copy())
 
 
 def frames(samples: Real, plan: WindowPlan, detrend: str = "none") -> Real:
@@ -172,37 +193,89 @@ def transform(samples: Real, basis: FoldedBasis) -> tuple[Real, Real]:
     tuple of ndarray, each shape (n_f, n_channels, n_windows)
         Real and imaginary parts of ``Σ w(t) x(t) exp(−jωt)``.
     """
-    count = basis.plan.count(samples.shape[1])
-    parts = np.empty((basis.n_frequencies, 2, count, samples.shape[0]))
-    transform_into(samples, basis, parts)
+    parts = transform_of([(Halves(samples), 0, basis.plan.count(samples.shape[1]))], basis)
     real, imaginary = parts[:, 0].transpose(0, 2, 1), parts[:, 1].transpose(0, 2, 1)
     return real, imaginary
 
 
-def transform_into(samples: Real, basis: FoldedBasis, parts: Real) -> None:
-    """As `transform`, into rows that are there, shape (n_f, 2, n_windows, n_channels).
+def transform_of(pieces: Sequence[Piece], basis: FoldedBasis) -> Real:
+    """As `transform`, of windows of several records side by side.
 
-    Windows come before channels, so that the windows of several records lie side by side.
+    Parameters
+    ----------
+    pieces : sequence of (Halves, int, int)
+        Records of as many channels each, the number of the first window and how many.
+    basis : FoldedBasis
+
+    Returns
+    -------
+    ndarray, shape (n_f, 2, n_windows, n_channels)
+        Real and imaginary parts.
     """
-    length, hop = basis.plan.length, basis.plan.hop
+    channels = len(pieces[0][0].samples)
+    batches = list(runs(pieces, basis.plan.length * channels, ROWS_AT_ONCE))
+    counts = [sum(count for _, _, count in batch) for batch in batches]
+    parts = np.empty((basis.n_frequencies, 2, sum(counts), channels))
+    # Fresh memory for each batch would take longer than the products.
+    sizes = [max(counts, default=0) * channels * each.cosine.shape[1] for each in basis.levels]
+    rows = [(np.empty(size), np.empty(size)) for size in sizes]
+    first = 0
+    for batch, count in zip(batches, counts, strict=True):
+        _fill_rows(batch, basis, rows)
+        start = basis.n_frequencies
+        for sides, known in zip(rows, basis.levels, strict=True):
+            start -= len(known.cosine)
+            for place, (row, table) in enumerate(
+                zip(sides, (known.cosine, known.sine), strict=True)
+            ):
+                found = parts[start : start + len(table), place, first : first + count]
+                found = found.reshape(len(table), count * channels)
+                many = row[: found.shape[1] * table.shape[1]].reshape(found.shape[1], -1)
+                np.matmul(table, many.T, out=found)
+        first += count
+    return parts
+
+
+def runs(pieces: Sequence[Piece], each: int, most: int) -> Iterator[list[Piece]]:
+    """Pieces cut into runs of windows that are held together, so that memory stays bounded.
+
+    Parameters
+    ----------
+    pieces : sequence of (Halves, int, int)
+    each, most : int
+        Numbers of one window, and of a run as far as it has more windows than one.
+    """
+    run: list[Piece] = []
+    room = most
+    for record, first, count in pieces:
+        done = 0
+        while done < count:
+            if run and room < each:
+                yield run
+                run, room = [], most
+            taken = min(count - done, max(room // each, 1))
+            run.append((record, first + done, taken))
+            done, room = done + taken, room - taken * each
+    if run:
+        yield run
+
+
+def _fill_rows(pieces: Sequence[Piece], basis: FoldedBasis, rows: list[tuple[Real, Real]]) -> None:
+    """Even and odd parts of windows about their middles, by level."""
+    plan = basis.plan
+    sizes = plan.length, plan.hop
+    spans = [(first, count) for _, first, count in pieces]
+    records = [halves.samples for halves, _, _ in pieces]
     if basis.detrend == "line":
         # Each has a line of its own: frames, one after another, as channels of one window.
-        window = frames(samples, basis.plan, "line").transpose(1, 0, 2)
-        samples, hop = window.reshape(-1, length), length
-    width = max(length // 2 + 1, basis.slow[0].width if basis.slow else 0)
-    for place, rows in enumerate(_native.folded_frames(samples, length, hop, width)):
-        part = rows.reshape(-1, width)
-        _product(basis, place, part, parts[:, place].reshape(len(parts), len(part)))
-
-
-def _product(basis: FoldedBasis, place: int, rows: Real, found: Real) -> None:
-    """Slow sinusoids with the projected rows, fast ones with the rows themselves."""
-    start, projected = len(found) - len(basis.cosine), rows
-    for panels in reversed(basis.slow):
-        projected = panels.space.project(projected)
-        known = (panels.cosine, panels.sine)[place]
-        start -= len(known)
-        np.matmul(known, projected.T, out=found[start : start + len(known)])
-    known = (basis.cosine, basis.sine)[place]
-    fast = found[len(found) - len(known) :]
-    np.matmul(known, rows[:, : known.shape[1]].T, out=fast)
+        records = [
+            frames(record, plan, "line").transpose(1, 0, 2)[first : first + count]
+            for record, (first, count) in zip(records, spans, strict=True)
+        ]
+        records = [record.reshape(-1, plan.length) for record in records]
+        spans, sizes = [(0, 1)] * len(records), (plan.length, plan.length)
+    weights, halves = np.empty(0), []
+    if basis.halved:
+        weights = halved_weights()
+        halves = [each.about(plan.length // 2, plan.hop) for each, _, _ in pieces]
+    _native.folded_frames(records, halves, spans, sizes, weights, stepped_weights(), rows)
