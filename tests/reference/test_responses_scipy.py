@@ -23,6 +23,16 @@ def _arrays(n: int = 3000, seed: int = 1) -> tuple[np.ndarray, np.ndarray]:
 
 
 @pytest.mark.parametrize(("length", "shifts"), [(256, 2), (200, 5), (128, 1), (96, 4)])
+def _weights_hold_what_is_said_of_them() -> None:
+    for weights, highest, miss in (
+        (halved_weights(), HALVED, 2e-13),
+        (stepped_weights(), STEPPED, 5e-14),
+    ):
+        omega = np.linspace(0.0, highest, 4001)
+        cosines = np.cos(np.multiply.outer(omega, 2.0 * np.arange(len(weights)) + 1.0))
+        assert_close(2.0 * cosines @ weights, 1.0, atol=miss, why="places between, by both sides")
+
+
 @pytest.mark.parametrize("detrend", ["none", "mean", "line"])
 def test_spectral_matrix_is_that_of_csd(length: int, shifts: int, detrend: str) -> None:
     u, y = _arrays()
@@ -79,6 +89,7 @@ def test_transform_between_bins_is_that_of_the_chirp_z_transform(length: int, hi
     [(2940, 1.25), (1740, 1.5), (1022, 1.25), (600, 1.25), (130, 1.25), (2940, 0.05)],
 )
 def test_halved_rows_are_the_exact_transform(length: int, high: float, detrend: str) -> None:
+    _weights_hold_what_is_said_of_them()
     # Records halved or not, rows halved often, once, never, or all of them; large levels.
     rng = np.random.default_rng(length)
     samples = rng.standard_normal((2, 7001)) + np.array([[0.0], [30.0]])
@@ -90,16 +101,6 @@ def test_halved_rows_are_the_exact_transform(length: int, high: float, detrend: 
     real, imaginary = transform(samples, basis)
     limit = 1e-12 * np.abs(windows).sum(axis=2).max()
     assert_close(real + 1j * imaginary, exact, atol=limit, why="kernels miss 1e-12 of a sinusoid")
-
-
-def test_weights_of_halvings_hold_what_is_said_of_them() -> None:
-    for weights, highest, miss in (
-        (halved_weights(), HALVED, 2e-13),
-        (stepped_weights(), STEPPED, 5e-14),
-    ):
-        omega = np.linspace(0.0, highest, 4001)
-        cosines = np.cos(np.multiply.outer(omega, 2.0 * np.arange(len(weights)) + 1.0))
-        assert_close(2.0 * cosines @ weights, 1.0, atol=miss, why="places between, by both sides")
 
 
 def test_groups_of_windows_make_no_difference(monkeypatch: pytest.MonkeyPatch) -> None:
