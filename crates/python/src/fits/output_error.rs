@@ -112,6 +112,35 @@ pub fn record_data(records: &[Flown<'_>], own: Vec<Own<'_>>) -> PyResult<Vec<Rec
         .collect()
 }
 
+/// A linear family on one record, what was measured there, and where its parameters stand.
+pub struct OnRecord<F: LinearFamily> {
+    /// The family, driven by the record's inputs.
+    pub trajectories: LinearTrajectories<F>,
+    /// Measurements and own numbers, of that record alone.
+    pub data: Vec<RecordData>,
+    /// Free parameters.
+    pub theta: Vec<f64>,
+}
+
+impl<F: LinearFamily> OnRecord<F> {
+    /// Of all values, those that are free.
+    ///
+    /// # Errors
+    /// Where record and family do not fit, and NumPy's own.
+    pub fn new(
+        family: Result<F, CoreError>,
+        (values, free): (&[f64], &[usize]),
+        (record, own): (Flown<'_>, Own<'_>),
+        hold: &str,
+    ) -> PyResult<Self> {
+        let records = [record];
+        let trajectories = linear(family, &records, hold)?;
+        let data = record_data(&records, vec![own])?;
+        let theta = free.iter().map(|&place| values[place]).collect();
+        Ok(Self { trajectories, data, theta })
+    }
+}
+
 /// Copy a few numbers, of which calls that move memory would cost more than the numbers.
 fn copy_few(from: &[f64], into: &mut [f64]) {
     let (chunks, rest) = from.as_chunks::<LANES>();

@@ -19,7 +19,7 @@ use crate::fits::frequency_fit::{
 };
 use crate::fits::least_squares::WrittenResiduals;
 use crate::fits::output_error::{
-    self, Flown, NoiseArguments, Own, SearchArguments, linear, record_data,
+    self, Flown, NoiseArguments, OnRecord, Own, SearchArguments, linear, record_data,
 };
 use crate::models::lookup_table::{LookupTable, shared};
 use crate::row_major::{RowMajor1, RowMajor2};
@@ -292,13 +292,10 @@ impl StateSpace {
         hold: &str,
         with_slopes: bool,
     ) -> PyResult<(Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>)> {
-        let family = StateSpaceFamily::new(&self.tape, &self.point, values.as_slice()?, &free);
-        let records = [record];
-        let trajectories = linear(family, &records, hold)?;
-        let data = record_data(&records, vec![own])?;
         let values = values.as_slice()?;
-        let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();
-        output_error::run(py, &trajectories, &data, 0, &theta, with_slopes)
+        let family = StateSpaceFamily::new(&self.tape, &self.point, values, &free);
+        let on = OnRecord::new(family, (values, &free), (record, own), hold)?;
+        output_error::run(py, &on.trajectories, &on.data, 0, &on.theta, with_slopes)
     }
 
     /// slope_products(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, left: NDArray[np.float64] | None) -> tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -317,12 +314,9 @@ impl StateSpace {
         left: Option<RowMajor2<'py, f64>>,
     ) -> PyResult<output_error::Summed<'py>> {
         let values = values.as_slice()?;
-        let records = [record];
-        let trajectories =
-            linear(StateSpaceFamily::new(&self.tape, &self.point, values, &free), &records, hold)?;
-        let data = record_data(&records, vec![own])?;
-        let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();
-        output_error::slope_products(py, &trajectories, &data[0], &theta, left)
+        let family = StateSpaceFamily::new(&self.tape, &self.point, values, &free);
+        let on = OnRecord::new(family, (values, &free), (record, own), hold)?;
+        output_error::slope_products(py, &on.trajectories, &on.data[0], &on.theta, left)
     }
 
     /// slope_step(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, left: NDArray[np.float64], step: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]
@@ -342,12 +336,9 @@ impl StateSpace {
         step: RowMajor1<'py, f64>,
     ) -> PyResult<output_error::Stepped<'py>> {
         let values = values.as_slice()?;
-        let records = [record];
-        let trajectories =
-            linear(StateSpaceFamily::new(&self.tape, &self.point, values, &free), &records, hold)?;
-        let data = record_data(&records, vec![own])?;
-        let theta: Vec<f64> = free.iter().map(|&place| values[place]).collect();
-        output_error::slope_step(py, &trajectories, &data[0], &theta, left, step)
+        let family = StateSpaceFamily::new(&self.tape, &self.point, values, &free);
+        let on = OnRecord::new(family, (values, &free), (record, own), hold)?;
+        output_error::slope_step(py, &on.trajectories, &on.data[0], &on.theta, left, step)
     }
 }
 
