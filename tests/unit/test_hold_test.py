@@ -16,6 +16,7 @@ from flightid.identification.hold_slopes import FormedSlopes, SummedSlopes
 from flightid.identification.hold_steps import (
     products_of,
     some_columns,
+    squares_of_steps,
     steps_of,
     weighed,
 )
@@ -440,6 +441,13 @@ def test_products_of_a_step_are_those_of_its_columns() -> None:
     rows = np.concatenate(list(weighed(left, formed, weights, 3)))
     found = products_of(formed.products(left), weights, 3)
     assert_close(found, rows.T @ rows, rtol=1e-12, why="rounding of two ways")
+    # A step that leaves all, and one that leaves less than sums can tell.
+    step = random.standard_normal(5)
+    for rest in (left, slopes @ step + 1e-7 * left):
+        known = slopes[:, :, :3] @ step[:3], slopes[:, :, 3:] @ step[3:], rest - slopes @ step
+        squares = squares_of_steps([rest], [formed], [formed.products(rest)], [step], 3)
+        wanted = np.sum(np.square(known), axis=2).T
+        assert_close(squares, wanted, rtol=1e-9, why="rounding of two ways")
     some = np.concatenate(list(some_columns(left, formed, 3, [5, 0, 4])))
     taken = np.repeat(weights, 700)[:, None] * some
     assert_close(taken, rows[:, [5, 0, 4]], rtol=1e-15, why="the same numbers")
@@ -463,8 +471,8 @@ def test_sums_of_a_run_are_those_of_its_derivatives(*, shifted: bool) -> None:
         share = (found - wanted) / scale[:, :, None] / scale[:, None]
         assert_close(share, np.zeros_like(share), atol=1e-12, why="rounding of two ways")
     step = np.random.default_rng(1).standard_normal(wanted.shape[1] - 1)
-    for found, wanted in zip(summed.stepped(left, step), formed.stepped(left, step), strict=True):
-        assert_close(found, wanted, rtol=1e-9, atol=1e-9 * np.ptp(wanted), why="two ways")
+    rest = formed.stepped(left, step)
+    assert_close(summed.stepped(left, step), rest, atol=1e-12 * np.ptp(rest), why="two ways")
 
 
 def test_own_numbers_of_one_effect_take_nothing_from_shared_parameters() -> None:

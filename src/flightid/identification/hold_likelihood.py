@@ -21,15 +21,12 @@ from flightid.frozen import dataclass
 from flightid.identification.delay_cells import DelayCells, later_by
 from flightid.identification.fit import Fit
 from flightid.identification.hold_slopes import (
-    LEFT,
-    OWN,
-    SHARED,
     RunSlopes,
     begun_with_slopes,
     residuals_of,
     whitened,
 )
-from flightid.identification.hold_steps import steps_of
+from flightid.identification.hold_steps import LEFT, OWN, SHARED, squares_of_steps, steps_of
 from flightid.identification.output_error.equation_records import (
     EquationRuns,
     equation_runs,
@@ -264,9 +261,8 @@ def _under(
             products = [each[1] for each in begun]
         limits = None if cell is None else (cell[0] - values, cell[1] - values)
         steps = steps_of(left, slopes, products, sizes, len(free), limits)
-        ends = [run.stepped(*pair) for run, *pair in zip(slopes, left, steps, strict=True)]
-        left = [each for each, _ in ends]
-        squares = np.sum([each for _, each in ends], axis=0)
+        ran = slopes
+        squares = squares_of_steps(left, ran, products, steps, len(free))
         sizes = np.sqrt(squares[:, LEFT] * len(sizes) / samples)
         over = squares / np.where(sizes > 0.0, sizes, 1.0)[:, None] ** 2
         moved = np.sum(over, axis=0)
@@ -281,7 +277,9 @@ def _under(
         prepared = replace(prepared, own=own)
         if ended:
             break
-    return HeldOutputs(values, left)
+    # Residuals themselves are asked where the steps end.
+    ends = [run.stepped(*pair) for run, *pair in zip(ran, left, steps, strict=True)]
+    return HeldOutputs(values, ends)
 
 
 def _require_near(left: Sequence[Array], slopes: Sequence[RunSlopes], largest: Array) -> None:

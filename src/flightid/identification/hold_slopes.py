@@ -17,14 +17,17 @@ from numpy.typing import NDArray
 from flightid.frozen import dataclass
 from flightid.identification.output_error.distinct import run_with_slopes
 from flightid.identification.output_error.equation_records import EquationRuns
-from flightid.identification.records.setup import OwnNumbers, RecordSet
+from flightid.identification.records.setup import (
+    NativeOwn,
+    NativeRecord,
+    OwnNumbers,
+    RecordSet,
+)
 from flightid.recursive_filter import filtered
 
 Array = NDArray[np.float64]
 LONG = 1 << 20
 """Derivatives of a record that leave the cache: a run makes them as fast as memory gives them."""
-SHARED, OWN, LEFT = range(3)
-"""Places of squares of a step: changes by shared parameters, by own numbers, and what is left."""
 
 
 class RunSlopes(Protocol):
@@ -33,8 +36,8 @@ class RunSlopes(Protocol):
     def products(self, left: Array) -> Array:
         """Products of all columns with residuals as the last, by output, (n_outputs, k, k)."""
 
-    def stepped(self, left: Array, step: Array) -> tuple[Array, Array]:
-        """What a step leaves of residuals, and squares by output, (n_outputs, 3)."""
+    def stepped(self, left: Array, step: Array) -> Array:
+        """What a step leaves of residuals."""
 
     def columns(self) -> Array:
         """The derivatives, shape (n_outputs, n_samples, k - 1)."""
@@ -73,15 +76,9 @@ class FormedSlopes:
                 each[count, count] = rest @ rest
         return found
 
-    def stepped(self, left: Array, step: Array) -> tuple[Array, Array]:
+    def stepped(self, left: Array, step: Array) -> Array:
         """As `RunSlopes` says."""
-        apart = np.zeros((len(step), 2))
-        apart[: self.n_free, SHARED] = step[: self.n_free]
-        apart[self.n_free :, OWN] = step[self.n_free :]
-        shared, own = np.moveaxis(self.slopes @ apart, 2, 0)
-        rest = left - shared - own
-        squares = [np.einsum("ij,ij->i", each, each) for each in (shared, own, rest)]
-        return rest, np.transpose(squares)
+        return np.asarray(left - self.slopes @ step)
 
     def columns(self) -> Array:
         """As `RunSlopes` says."""
@@ -97,25 +94,23 @@ class SummedSlopes:
     own: OwnNumbers
     is_finite: bool = True
 
-    def _asked(self, given: Array | None, *step: Array) -> tuple[Array, Array]:
-        model, numbers = self.prepared.model, self.own.native
+    @property
+    def _asked(self) -> tuple[Array, list[int], NativeRecord, NativeOwn, str]:
+        model, record = self.prepared.model, self.prepared.arrays[self.place]
         values, free = model.parameters.independent_values(), model.parameters.free_indices
-        record, hold = self.prepared.arrays[self.place], self.prepared.hold
-        if step and given is not None:
-            return model.native.slope_step(values, free, record, numbers, hold, given, *step)
-        return model.native.slope_products(values, free, record, numbers, hold, given)
+        return values, free, record, self.own.native, self.prepared.hold
 
     def begun(self) -> tuple[Array, Array]:
         """Residuals of the run itself, and their products."""
-        return self._asked(None)
+        return self.prepared.model.native.slope_products(*self._asked, None)
 
     def products(self, left: Array) -> Array:
         """As `RunSlopes` says."""
-        return self._asked(left)[1]
+        return self.prepared.model.native.slope_products(*self._asked, left)[1]
 
-    def stepped(self, left: Array, step: Array) -> tuple[Array, Array]:
+    def stepped(self, left: Array, step: Array) -> Array:
         """As `RunSlopes` says."""
-        return self._asked(left, step)
+        return self.prepared.model.native.slope_step(*self._asked, left, step)
 
     def columns(self) -> Array:
         """As `RunSlopes` says."""

@@ -19,6 +19,10 @@ ALIKE = 1e-9
 """Share of an own number's effect that others of its record leave, up to which it is rounding."""
 AT_ONCE = 1 << 16
 """Rows that are turned into a triangle together."""
+SHARED, OWN, LEFT = range(3)
+"""Places of squares of a step: changes by shared parameters, by own numbers, and what is left."""
+DIGITS = 1e-6
+"""Share of squares before a step, below which sums hold fewer than ten digits of what is left."""
 
 
 def steps_of(
@@ -69,6 +73,38 @@ def steps_of(
         own = np.zeros(len(kept))
         own[kept] = np.linalg.lstsq(each[:m, :m], rest)[0]
         found.append(np.concatenate([shared, own]))
+    return found
+
+
+def squares_of_steps(
+    left: Sequence[Array],
+    slopes: Sequence[RunSlopes],
+    products: Sequence[Array],
+    steps: Sequence[Array],
+    n_free: int,
+) -> Array:
+    """Squares of changes and of what is left, by output of all records: (n_outputs, 3).
+
+    From sums alone where these keep their digits, without a run.
+
+    Parameters
+    ----------
+    left, slopes, products, n_free
+        As for `steps_of`.
+    steps : sequence of ndarray
+        What that gave.
+    """
+    found = np.zeros((len(left[0]), 3))
+    for rest, slope, product, step in zip(left, slopes, products, steps, strict=True):
+        moves = np.zeros((3, step.size + 1))
+        moves[SHARED, :n_free], moves[OWN, n_free:-1] = step[:n_free], step[n_free:]
+        moves[LEFT] = [*-step, 1.0]
+        with np.errstate(over="ignore", invalid="ignore"):
+            squares = np.sum((moves @ product) * moves, axis=2)
+            known = squares[:, LEFT] > DIGITS * (product[:, -1, -1] + squares[:, :LEFT].sum(axis=1))
+        if not np.all(known):
+            squares[:, LEFT] = np.sum(slope.stepped(rest, step) ** 2, axis=1)
+        found += squares
     return found
 
 

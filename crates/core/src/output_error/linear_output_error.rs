@@ -3,11 +3,11 @@
 
 use crate::error::CoreError;
 use crate::linear::block_recursion::BLOCK;
-use crate::linear::discretisation::{Hold, Sampled, discretise};
+use crate::linear::discretisation::{Hold, Sampled, Tap, discretise};
 use crate::linear::linear_simulation::sample;
 use crate::output_error::linear_family::{LinearFamily, LinearPoint};
 use crate::output_error::linear_sensitivities::{Recursion, Workspace};
-use crate::output_error::model_on_records::{Trajectories, Wanted};
+use crate::output_error::model_on_records::{Directed, Trajectories, Wanted};
 use crate::output_error::record_data::RecordInputs;
 
 /// A linear family on records.
@@ -123,6 +123,37 @@ impl<F: LinearFamily> Trajectories for LinearTrajectories<F> {
         }
         Ok(())
     }
+}
+
+impl<F: LinearFamily> Directed for LinearTrajectories<F> {
+    fn along(&self, shared: &Systems, step: &[f64]) -> Systems {
+        let Systems { continuous, by_sample_time } = shared;
+        let outputs = continuous.slopes.iter().map(|slope| slope.c.as_slice());
+        let slope = LinearPoint { c: summed(outputs, step), ..LinearPoint::default() };
+        let sampled = by_sample_time.iter().map(|(time, value, slopes)| {
+            let transition = summed(slopes.iter().map(|each| each.transition.as_slice()), step);
+            let taps = value.taps.iter().enumerate().map(|(t, tap)| Tap {
+                state: summed(slopes.iter().map(|each| each.taps[t].state.as_slice()), step),
+                output: summed(slopes.iter().map(|each| each.taps[t].output.as_slice()), step),
+                ..tap.clone()
+            });
+            let along = Sampled { transition, taps: taps.collect() };
+            (*time, value.clone(), vec![along])
+        });
+        let by_sample_time = sampled.collect();
+        let continuous = LinearPoint { slopes: vec![slope], ..continuous.clone() };
+        Systems { continuous, by_sample_time }
+    }
+}
+
+/// Numbers weighed and added up, place by place.
+fn summed<'a>(parts: impl Iterator<Item = &'a [f64]>, weights: &[f64]) -> Vec<f64> {
+    let mut found = Vec::new();
+    for (part, weight) in parts.zip(weights) {
+        found.resize(part.len(), 0.0);
+        found.iter_mut().zip(part).for_each(|(sum, value)| *sum += weight * value);
+    }
+    found
 }
 
 /// Samples of the inputs behind each tap for a block.

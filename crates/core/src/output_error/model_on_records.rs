@@ -69,3 +69,10 @@ pub trait Trajectories: Sync {
         sink: &mut dyn FnMut(usize, &mut [f64]),
     ) -> Result<(), CoreError>;
 }
+
+/// A model whose derivatives may be asked along one step of θ alone.
+pub trait Directed: Trajectories {
+    /// What `share` gave with slopes, its derivatives by θ the single one along a step: a run then has
+    /// one column by θ.
+    fn along(&self, shared: &Self::Shared, step: &[f64]) -> Self::Shared;
+}

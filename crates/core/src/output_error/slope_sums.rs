@@ -3,7 +3,7 @@
 
 use crate::error::CoreError;
 use crate::numerics::widest::widest;
-use crate::output_error::model_on_records::{LANES, Trajectories, Wanted};
+use crate::output_error::model_on_records::{Directed, LANES, Trajectories, Wanted};
 use crate::output_error::output_sums::OutputSums;
 use crate::output_error::record_data::{RecordData, same};
 
@@ -13,15 +13,6 @@ pub struct Sloped<'a, T: Trajectories> {
     record: usize,
     data: &'a RecordData,
     shared: T::Shared,
-}
-
-/// What a step leaves of residuals.
-#[derive(Debug, Clone)]
-pub struct Stepped {
-    /// n_outputs × n_samples.
-    pub left: Vec<f64>,
-    /// By output, squares of changes by θ, of changes by the record's own numbers, and of what is left.
-    pub squares: Vec<[f64; 3]>,
 }
 
 impl<'a, T: Trajectories> Sloped<'a, T> {
@@ -47,11 +38,15 @@ impl<'a, T: Trajectories> Sloped<'a, T> {
         self.trajectories.n_parameters() + self.data.n_free()
     }
 
-    fn run(&self, sink: &mut dyn FnMut(usize, &mut [f64])) -> Result<(), CoreError> {
+    fn run(
+        &self,
+        shared: &T::Shared,
+        sink: &mut dyn FnMut(usize, &mut [f64]),
+    ) -> Result<(), CoreError> {
         let RecordData { initial, shift, .. } = self.data;
         let wanted = self.wanted();
         let scratch = &mut Vec::new();
-        self.trajectories.run(&self.shared, self.record, initial, shift, &wanted, scratch, sink)
+        self.trajectories.run(shared, self.record, initial, shift, &wanted, scratch, sink)
     }
 
     fn wanted(&self) -> Wanted<'a> {
@@ -75,7 +70,7 @@ impl<'a, T: Trajectories> Sloped<'a, T> {
         }
         let mut sums = OutputSums::default();
         sums.clear(p, stride);
-        self.run(&mut |first, rows| {
+        self.run(&self.shared, &mut |first, rows| {
             let measured = data.measured[first * p..].chunks_exact(p);
             for (k, (sample, measured)) in
                 rows.chunks_exact_mut(p * stride).zip(measured).enumerate()
@@ -117,54 +112,47 @@ impl<'a, T: Trajectories> Sloped<'a, T> {
         }
         found
     }
+}
 
-    /// What a step of all columns leaves of residuals (n_outputs × n_samples), to first order.
+impl<T: Directed> Sloped<'_, T> {
+    /// What a step of all columns leaves of residuals (n_outputs × n_samples), to first order: θ moves
+    /// along the step alone.
     ///
     /// # Errors
     /// As the model's run; `Shape` for a step or residuals of another length.
-    pub fn stepped(&self, given: &[f64], step: &[f64]) -> Result<Stepped, CoreError> {
+    pub fn stepped(&self, given: &[f64], step: &[f64]) -> Result<Vec<f64>, CoreError> {
         let (p, n_theta) = (self.trajectories.n_outputs(), self.trajectories.n_parameters());
         let n = self.trajectories.record_lengths()[self.record];
         same("residuals", given.len(), p * n)?;
         same("step", step.len(), self.n_columns())?;
-        let stride = self.wanted().stride(n_theta);
-        let run = self.n_columns() - self.data.free_bias.len();
+        let (by_theta, by_own) = step.split_at(n_theta);
+        let mut weights = vec![0.0; self.wanted().stride(1)];
+        let n_run = by_own.len() - self.data.free_bias.len();
+        weights[1] = 1.0;
+        weights[2..2 + n_run].copy_from_slice(&by_own[..n_run]);
         let mut biases = vec![0.0; p];
-        let moved = self.data.free_bias.iter().zip(&step[run..]);
+        let moved = self.data.free_bias.iter().zip(&by_own[n_run..]);
         moved.for_each(|(&output, change)| biases[output] += change);
-        let (mut by_theta, mut by_own) = (vec![0.0; stride], vec![0.0; stride]);
-        by_theta[1..=n_theta].copy_from_slice(&step[..n_theta]);
-        by_own[1 + n_theta..=run].copy_from_slice(&step[n_theta..run]);
-        let mut found = Stepped { left: given.to_vec(), squares: vec![[0.0; 3]; p] };
-        self.run(&mut |first, rows| {
+        let mut left = given.to_vec();
+        let along = self.trajectories.along(&self.shared, by_theta);
+        self.run(&along, &mut |first, rows| {
             widest(
                 #[inline(always)]
-                || take(&mut found, rows, (&by_theta, &by_own), &biases, first, n),
+                || take(&mut left, rows, &weights, &biases, first, n),
             );
         })?;
-        Ok(found)
+        Ok(left)
     }
 }
 
 /// Take the changes of a block of samples from what was left.
 #[inline(always)]
-fn take(
-    found: &mut Stepped,
-    rows: &[f64],
-    (by_theta, by_own): (&[f64], &[f64]),
-    biases: &[f64],
-    first: usize,
-    n: usize,
-) {
-    let (p, stride) = (biases.len(), by_theta.len());
-    for (o, (squares, bias)) in found.squares.iter_mut().zip(biases).enumerate() {
-        let samples = rows.chunks_exact(p * stride).zip(&mut found.left[o * n + first..]);
+fn take(left: &mut [f64], rows: &[f64], weights: &[f64], biases: &[f64], first: usize, n: usize) {
+    let (p, stride) = (biases.len(), weights.len());
+    for (o, bias) in biases.iter().enumerate() {
+        let samples = rows.chunks_exact(p * stride).zip(&mut left[o * n + first..]);
         for (sample, left) in samples {
-            let row = &sample[o * stride..(o + 1) * stride];
-            let (shared, own) = (inner(row, by_theta), inner(row, by_own) + bias);
-            *left -= shared + own;
-            let sizes = [shared, own, *left];
-            squares.iter_mut().zip(sizes).for_each(|(sum, value)| *sum += value * value);
+            *left -= inner(&sample[o * stride..(o + 1) * stride], weights) + bias;
         }
     }
 }

@@ -7,7 +7,7 @@ use flightid_core::linear::discretisation::Hold;
 use flightid_core::output_error::likelihood::{Estimate, fit_from};
 use flightid_core::output_error::linear_family::LinearFamily;
 use flightid_core::output_error::linear_output_error::LinearTrajectories;
-use flightid_core::output_error::model_on_records::{LANES, Trajectories, Wanted};
+use flightid_core::output_error::model_on_records::{Directed, LANES, Trajectories, Wanted};
 use flightid_core::output_error::output_error_weights::Noise;
 use flightid_core::output_error::record_data::{RecordData, RecordInputs};
 use flightid_core::output_error::slope_sums::Sloped;
@@ -312,9 +312,6 @@ pub fn run<'py, T: Trajectories>(
 /// Residuals (n_outputs × n_samples), and by output products of all columns with these last.
 pub type Summed<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray3<f64>>);
 
-/// What a step leaves of residuals (n_outputs × n_samples), and squares by output.
-pub type Stepped<'py> = (Bound<'py, PyArray2<f64>>, Bound<'py, PyArray2<f64>>);
-
 /// Residuals of one record, its run's where none are given, and by output the products of all columns
 /// of derivatives (θ, free initial states, shifts, biases) with these last.
 ///
@@ -336,22 +333,19 @@ pub fn slope_products<'py, T: Trajectories>(
     Ok((left.reshape([p, n])?, products.into_pyarray(py).reshape([p, width, width])?))
 }
 
-/// What a step of all columns leaves of residuals, and by output the squares of changes by θ, of
-/// those by the record's own numbers, and of what is left.
+/// What a step of all columns leaves of residuals.
 ///
 /// # Errors
 /// As `slope_products`.
-pub fn slope_step<'py, T: Trajectories>(
+pub fn slope_step<'py, T: Directed>(
     py: Python<'py>,
     trajectories: &T,
     data: &RecordData,
     theta: &[f64],
     given: RowMajor2<'py, f64>,
     step: RowMajor1<'py, f64>,
-) -> PyResult<Stepped<'py>> {
+) -> PyResult<Bound<'py, PyArray2<f64>>> {
     let sloped = Sloped::new(trajectories, 0, data, theta).map_err(from_core)?;
-    let found = sloped.stepped(given.as_slice()?, step.as_slice()?).map_err(from_core)?;
-    let (p, n) = (trajectories.n_outputs(), trajectories.record_lengths()[0]);
-    let squares = found.squares.as_flattened().to_vec().into_pyarray(py);
-    Ok((found.left.into_pyarray(py).reshape([p, n])?, squares.reshape([p, 3])?))
+    let left = sloped.stepped(given.as_slice()?, step.as_slice()?).map_err(from_core)?;
+    left.into_pyarray(py).reshape([trajectories.n_outputs(), trajectories.record_lengths()[0]])
 }

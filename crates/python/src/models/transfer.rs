@@ -199,10 +199,9 @@ impl TransferFunctions {
         output_error::slope_products(py, &on.trajectories, &on.data[0], &on.theta, left)
     }
 
-    /// slope_step(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, left: NDArray[np.float64], step: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+    /// slope_step(self, values: NDArray[np.float64], free: Sequence[int], record: tuple[NDArray[np.float64], NDArray[np.float64], float], own: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int], Sequence[int], Sequence[tuple[float, float]]], hold: str, left: NDArray[np.float64], step: NDArray[np.float64]) -> NDArray[np.float64]
     ///
-    /// What a step of all columns that `run_record` gives leaves of residuals, to first order, and by
-    /// output the squares of changes by θ, by the record's own numbers, and of what is left.
+    /// What a step of all columns that `run_record` gives leaves of residuals, to first order.
     #[allow(clippy::too_many_arguments)]
     fn slope_step<'py>(
         &self,
@@ -214,7 +213,7 @@ impl TransferFunctions {
         hold: &str,
         left: RowMajor2<'py, f64>,
         step: RowMajor1<'py, f64>,
-    ) -> PyResult<output_error::Stepped<'py>> {
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
         let values = values.as_slice()?;
         let family = TransferFamily::new(&self.functions, &self.pairs, values, &free);
         let on = OnRecord::new(family, (values, &free), (record, own), hold)?;

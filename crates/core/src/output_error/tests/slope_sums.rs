@@ -13,7 +13,8 @@ fn wave(k: usize, output: usize, column: usize) -> f64 {
 }
 
 impl Trajectories for Waves {
-    type Shared = ();
+    /// The step along which θ moves alone, if any.
+    type Shared = Option<Vec<f64>>;
 
     fn n_outputs(&self) -> usize {
         P
@@ -33,12 +34,12 @@ impl Trajectories for Waves {
     fn is_affine(&self) -> bool {
         true
     }
-    fn share(&self, _: &[f64], _: bool) -> Result<(), CoreError> {
-        Ok(())
+    fn share(&self, _: &[f64], _: bool) -> Result<Self::Shared, CoreError> {
+        Ok(None)
     }
     fn run(
         &self,
-        (): &(),
+        shared: &Self::Shared,
         _: usize,
         _: &[f64],
         _: &[f64],
@@ -46,18 +47,32 @@ impl Trajectories for Waves {
         scratch: &mut Vec<f64>,
         sink: &mut dyn FnMut(usize, &mut [f64]),
     ) -> Result<(), CoreError> {
-        let (stride, columns) = (wanted.stride(2), wanted.columns(2));
+        let n_theta = shared.as_ref().map_or(2, |_| 1);
+        let (stride, columns) = (wanted.stride(n_theta), wanted.columns(n_theta));
         for first in (0..N).step_by(50) {
             scratch.clear();
             for k in first..N.min(first + 50) {
                 for output in 0..P {
-                    scratch.extend((0..columns).map(|column| wave(k, output, column)));
+                    scratch.push(wave(k, output, 0));
+                    match shared {
+                        Some(step) => scratch.push(
+                            step.iter().zip(1..).map(|(each, c)| each * wave(k, output, c)).sum(),
+                        ),
+                        None => scratch.extend([1, 2].map(|column| wave(k, output, column))),
+                    }
+                    scratch.extend([3, 4].map(|column| wave(k, output, column)));
                     scratch.resize(scratch.len() + stride - columns, 0.0);
                 }
             }
             sink(first, scratch);
         }
         Ok(())
+    }
+}
+
+impl Directed for Waves {
+    fn along(&self, _: &Self::Shared, step: &[f64]) -> Self::Shared {
+        Some(step.to_vec())
     }
 }
 
@@ -111,18 +126,9 @@ fn a_step_leaves_what_its_columns_do() {
     let (left, _) = sloped.products(None).unwrap();
     let found = sloped.stepped(&left, &step).unwrap();
     for o in 0..P {
-        let mut wanted = [0.0; 3];
         for k in 0..N {
-            let moved = |columns: std::ops::Range<usize>| {
-                columns.map(|c| step[c] * slope(k, o, c)).sum::<f64>()
-            };
-            let (shared, own) = (moved(0..2), moved(2..5));
-            let rest = left[o * N + k] - shared - own;
-            assert!((found.left[o * N + k] - rest).abs() < 1e-14);
-            wanted.iter_mut().zip([shared, own, rest]).for_each(|(sum, each)| *sum += each * each);
-        }
-        for (sum, wanted) in found.squares[o].iter().zip(wanted) {
-            assert!((sum - wanted).abs() < 1e-11);
+            let moved: f64 = (0..5).map(|c| step[c] * slope(k, o, c)).sum();
+            assert!((found[o * N + k] - (left[o * N + k] - moved)).abs() < 1e-14);
         }
     }
     assert!(sloped.stepped(&left, &step[..4]).is_err());
