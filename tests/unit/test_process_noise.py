@@ -11,7 +11,7 @@ import flightid as fid
 from flightid.conventions import Light
 from flightid.identification.output_error import disturbed_states
 from flightid.identification.output_error.disturbed_states import (
-    _transforms,
+    _LookedAt,
     disturbances,
     moved_together,
 )
@@ -314,12 +314,17 @@ def test_what_inputs_foretell_is_least_squares_on_their_neighbours() -> None:
         assert_close(-taps[1:], np.linalg.lstsq(past, now)[0], why="least squares", rtol=1e-9)
 
 
-def test_rows_that_share_a_transform_keep_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
-    rows = np.random.default_rng(3).standard_normal((3, 77))
+def test_long_records_are_cut_to_quick_lengths(monkeypatch: pytest.MonkeyPatch) -> None:
+    white = np.random.default_rng(3).standard_normal((3, 79))
     monkeypatch.setattr(disturbed_states, "LONG", 10)
-    for count, n in ((3, 77), (2, 76), (1, 77)):
-        known = np.fft.rfft(rows[:count, :n], axis=1)
-        assert_close(_transforms(rows[:count, :n]), known, atol=1e-12, why="rounding")
+    system, none = disturbances(LATERAL, [LATERAL.state_space()[::2][:2]])[0], np.eye(3)
+    looked = _LookedAt.of(white, [np.ones(1)] * 3, none, system, 0.02)
+    known = np.fft.rfft(white[:, :77], axis=1)[:, 1:]
+    assert_close(looked.omega, 2.0 * np.pi * np.fft.rfftfreq(77, 0.02)[1:], rtol=1e-12, why="cut")
+    power = np.abs(known) ** 2
+    means = np.array([power[:, max(k - 8, 0) : k + 9].mean(axis=1) for k in range(38)]).T
+    assert_close(looked.power, means, rtol=1e-12, why="sums")
+    assert_close(looked.told, known / np.sqrt(means), atol=1e-12, why="rounding")
 
 
 def test_sensors_alone_move_together_by_chance_as_often_as_is_said() -> None:

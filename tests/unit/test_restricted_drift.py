@@ -145,6 +145,12 @@ def test_what_bends_no_slow_half_cycle_is_left_alone() -> None:
     noise = np.random.default_rng(0).standard_normal((1, N)).cumsum(axis=1)
     model = Autoregression(np.array([1.0]), np.empty(0), N, 512)
     assert with_drifts([model], [noise], [taken])[0] is model
+    long, none = np.random.default_rng(1).standard_normal((1, 5003)), np.zeros((1, 5003, 0))
+    found = slowest(long + 1.0, FittedDirections(none, none), np.ones(1), 4)[0, :, 0]
+    known = np.sqrt(np.array([1.0, 2.0, 2.0, 2.0]) / 5003) * [
+        np.cos(np.pi * k * (np.arange(5003) + 0.5) / 5003) @ (long[0] + 1.0) for k in range(4)
+    ]
+    assert_close(found, known, atol=2e-3, why="sums over blocks, in which cosines turn little")
 
 
 def test_an_output_that_tells_nothing_of_a_parameter_brings_no_doubt() -> None:

@@ -92,12 +92,19 @@ def explained_spans(
 def _powers(run: ExplainedRun, edges: Array) -> Array:
     """Of the run and of what it leaves, in each bin: shape (2, n_outputs, n_bins)."""
     n = run.measured.shape[1]
-    middle = run.measured.mean(axis=1, keepdims=True)
-    rows = np.stack([run.modelled - middle, run.measured - run.modelled]) * np.hanning(n)
-    power = np.abs(np.fft.rfft(rows, axis=2)) ** 2
+    window, middle = np.hanning(n), run.measured.mean(axis=1)
     omega = 2.0 * np.pi * np.fft.rfftfreq(n, run.sample_time_s)
-    place = np.digitize(omega, edges) - 1
-    return np.stack([power[:, :, place == k].sum(axis=2) for k in range(len(edges) - 1)], axis=2)
+    # Frequencies rise, so that those of a bin stand side by side.
+    places = np.searchsorted(omega, edges)
+    found = np.empty((2, len(middle), len(edges) - 1))
+    for kind, output in np.ndindex(found.shape[:2]):
+        measured, modelled = run.measured[output], run.modelled[output]
+        row = measured - modelled if kind else modelled - middle[output]
+        part = np.fft.rfft(row * window)[: places[-1]]
+        power = np.append(np.square(part.real) + np.square(part.imag), 0.0)
+        found[kind, output] = np.add.reduceat(power, places)[:-1]
+    found[:, :, np.diff(places) == 0] = 0.0
+    return found
 
 
 def _span(name: str, omega: Array, share: Array) -> Span:

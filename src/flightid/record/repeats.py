@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import scipy
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
@@ -209,10 +210,16 @@ def found_period(samples: Array) -> int | None:
 def _candidates(rows: Array, longest: int) -> NDArray[np.intp]:
     """Lags at which the sum of squared differences vanishes to the rounding of its sums."""
     n = rows.shape[1]
-    size = 1 << (2 * n - 1).bit_length()
-    spectrum = np.fft.rfft(rows, size, axis=1)
-    products = np.fft.irfft(np.abs(spectrum) ** 2, size, axis=1).sum(axis=0)
-    squares = np.concatenate([[0.0], np.cumsum(np.sum(rows**2, axis=0))])
+    # Room for the lags that are asked; row by row, for long records are large.
+    size = scipy.fft.next_fast_len(n + longest, real=True)
+    power = np.zeros(size // 2 + 1)
+    squares = np.zeros(n + 1)
+    for row in rows:
+        part = scipy.fft.rfft(row, size)
+        power += np.square(part.real) + np.square(part.imag)
+        squares[1:] += row**2
+    products = scipy.fft.irfft(power, size)
+    np.cumsum(squares, out=squares)
     lags = np.arange(1, longest + 1)
     away = squares[n - lags] + (squares[n] - squares[lags]) - 2.0 * products[lags]
     return np.asarray(lags[away <= 1e-9 * squares[n]], dtype=np.intp)

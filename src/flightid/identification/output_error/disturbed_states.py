@@ -42,7 +42,8 @@ MEMORIES_S = (0.0, 0.3, 2.0)
 FALSE_ALARMS = 0.001
 """Share of records with noise of sensors alone in which a disturbance is named."""
 LONG = 1 << 16
-"""Samples from which two rows are transformed together."""
+"""Samples from which a record is cut to a length of small factors, 0.7 % shorter at most, whose
+transform takes a seventh of the time."""
 TRIED = 2
 """Disturbances whose chance is worked out: those that stand out most."""
 
@@ -204,10 +205,11 @@ class _LookedAt:
         system: DisturbedSystem,
         step_s: float,
     ) -> _LookedAt:
-        spectra = turned @ _transforms(white)[:, 1:]
-        omega = 2.0 * np.pi * np.arange(1, spectra.shape[1] + 1) / (white.shape[1] * step_s)
-        power = _smoothed(np.abs(spectra) ** 2)
-        told = spectra / np.sqrt(power)
+        n = quick_length(white.shape[1])
+        spectra = turned @ scipy.fft.rfft(white[:, :n], axis=1)[:, 1:]
+        omega = 2.0 * np.pi * np.arange(1, spectra.shape[1] + 1) / (n * step_s)
+        power = _smoothed(np.square(spectra.real) + np.square(spectra.imag))
+        told = np.divide(spectra, np.sqrt(power), out=spectra)
         return cls(told, power, omega, np.array(filters), turned, system, step_s)
 
     def scores(self) -> tuple[Array, Array]:
@@ -228,30 +230,25 @@ class _LookedAt:
         )
 
 
-def _transforms(rows: Array) -> Complex:
-    """Of real rows (n_rows, n_samples), bins 0 to the middle.
+def quick_length(n: int) -> int:
+    """Samples of so many whose transform is quick: all where they are few.
 
-    Long records may have lengths of large factors, whose transforms are complex inside: two rows
-    share one there.
+    Example
+    -------
+    >>> quick_length(1009), quick_length(999_983)
+    (1009, 998250)
     """
-    count, n = rows.shape
-    if n < LONG:
-        return np.asarray(scipy.fft.rfft(rows, axis=1))
-    bins = np.arange(n // 2 + 1)
-    found = np.empty((count + count % 2, bins.size), dtype=np.complex128)
-    for first in range(0, count, 2):
-        second = rows[first + 1] if first + 1 < count else 0.0
-        both = scipy.fft.fft(rows[first] + 1j * second)
-        here, there = both[bins], np.conj(both[-bins])
-        found[first], found[first + 1] = 0.5 * (here + there), -0.5j * (here - there)
-    return found[:count]
+    while n >= LONG and scipy.fft.next_fast_len(n) > n:
+        n -= 1
+    return n
 
 
 def _smoothed(power: Array) -> Array:
     """Means over neighbouring frequencies, (n_outputs, n_omega)."""
+    count = power.shape[1]
     sums = np.cumsum(np.pad(power, ((0, 0), (1, 0))), axis=1)
-    place = np.arange(power.shape[1])
-    low = np.maximum(place - SMOOTH, 0)
-    high = np.minimum(place + SMOOTH + 1, power.shape[1])
-    means = (sums[:, high] - sums[:, low]) / (high - low)
+    ends = np.pad(sums, ((0, 0), (SMOOTH, SMOOTH)), mode="edge")
+    place = np.clip(np.arange(-SMOOTH, count + SMOOTH + 1), 0, count)
+    wide = 2 * SMOOTH + 1
+    means = (ends[:, wide:] - ends[:, :count]) / (place[wide:] - place[:count])
     return np.asarray(np.maximum(means, np.finfo(float).tiny))
