@@ -13,8 +13,6 @@ from flightid.files import write_atomically
 from flightid.logs.dataflash.layout import MessageLayout, standard_tables, stored
 
 STAMP = "TimeUS"
-ROWS_AT_ONCE = 65536
-"""Rows that are laid into the file together: bounds the memory of the index arrays."""
 
 
 class DataflashWriter:
@@ -267,10 +265,8 @@ def _merged(blocks: list[tuple[NDArray[np.uint64], NDArray[np.void]]]) -> bytes:
     done = 0
     for _, rows in blocks:
         size = rows.dtype.itemsize
-        bytes_of = rows.view(np.uint8).reshape(rows.size, size)
-        for start in range(0, rows.size, ROWS_AT_ONCE):
-            part = slice(start, min(start + ROWS_AT_ONCE, rows.size))
-            at = places[done + part.start : done + part.stop]
-            content[at[:, None] + np.arange(size)] = bytes_of[part]
+        # Every place at which a row may begin; numpy copies items whole, faster than byte by byte.
+        begins = np.ndarray((content.size - size + 1,), f"V{size}", content, strides=(1,))
+        begins[places[done : done + rows.size]] = rows.view(f"V{size}")
         done += rows.size
     return content.tobytes()
