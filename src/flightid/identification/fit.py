@@ -225,7 +225,7 @@ class Fit(
             f"{', '.join(seen)}, average cost {self.average_cost:.2f}{unit}{words})"
         )
 
-    @property
+    @cached_property
     def estimated(self) -> EstimateProvenance:
         """What is known of the estimates, as a model's file keeps it."""
         return EstimateProvenance(

@@ -18,6 +18,7 @@ from flightid.identification.reduction.rules import (
     choose,
     explained_rise,
 )
+from flightid.identification.shared_work import shared_work
 from flightid.models import GreyBoxModel
 from flightid.progress import progress
 from flightid.record import Record
@@ -142,7 +143,8 @@ def reduce(
     walk = _ReductionPath(data, fit, _options(fit, options), tuple(keep), dict(at or {}))
     for name in (*walk.keep, *walk.at):
         _ = fit.model.parameters[name]
-    with progress(None, "reducing the structure") as advance:
+    # All fits are to the same data: what is chosen of these is chosen once.
+    with shared_work(), progress(None, "reducing the structure") as advance:
         for name in drop:
             walk.force(name)
             advance()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import field
+from functools import cached_property
 
 from flightid.conventions import Light
 from flightid.errors import OptionError
@@ -151,7 +152,7 @@ class Reduction(Result, schema="flightid.reduction/1", untold={"data": "response
         """Verdict on the path, and those on the reduced fit."""
         return (*self.path_findings, *self.fit.findings)
 
-    @property
+    @cached_property
     def path_findings(self) -> tuple[Finding, ...]:
         """Verdict on the path alone."""
         found = [self._verdict()]
