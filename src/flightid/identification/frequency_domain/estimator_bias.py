@@ -132,11 +132,10 @@ class Correction:
         Raises as `apply`.
         """
         moved = [self._moved(model, parameter) for parameter in model.parameters.free]
-        changes = self._records.slopes(model, moved)
-        weights = self._weights(frequencies)
-        at_once = max(1, TOGETHER // changes[0].shape[1])
+        weights, records = self._weights(frequencies), self._records
+        at_once = max(1, TOGETHER // len(self.data.outputs))
         starts = range(0, len(moved), at_once)
-        parts = [weights([each[at : at + at_once] for each in changes]) for at in starts]
+        parts = [weights(records.slopes(model, moved[at : at + at_once])) for at in starts]
         return np.concatenate(parts)
 
     def halves(self, model: GreyBoxModel, frequencies: Places) -> tuple[Complex, Complex]:

@@ -146,10 +146,13 @@ class ModelResiduals:
         problems whose variables separate", *SIAM J. Numerical Analysis* 10 (1973).
         """
         kept = self._kept(model)
+        all_kept = len(kept) == len(self.outputs)  # a slice is no copy
+        rows = slice(None) if all_kept else kept
         found = [np.zeros(0)] * len(self.linear.output_records)
         for n, (motion, groups) in self._followed(model).items():
             shape = len(moved), len(self.outputs), n
-            wholes = [np.zeros((len(runs.places), *shape)) for runs in groups]
+            space = np.empty if all_kept else np.zeros
+            wholes = [space((len(runs.places), *shape)) for runs in groups]
             sides = [_Side.of(runs, kept, motion) for runs in groups]
             for place, (other, step) in enumerate(moved):
                 systems, beyond = self._motion(other, kept, n, motion.systems)
@@ -157,10 +160,10 @@ class ModelResiduals:
                 beyond /= step
                 for whole, side in zip(wholes, sides, strict=True):
                     driven = self._driven(systems, kept, side.runs.places)
-                    whole[:, place, kept] = side.moved(driven, step, beyond)
+                    whole[:, place, rows] = side.moved(driven, step, beyond)
             for whole, side in zip(wholes, sides, strict=True):
                 turns = np.stack(side.turns, axis=1)
-                _take_motion_out(whole, kept, side.runs.fitter, motion.basis, turns)
+                _take_motion_out(whole, rows, side.runs.fitter, motion.basis, turns)
                 for place, change in zip(side.runs.places, whole, strict=True):
                     found[place] = change
         return found
@@ -360,16 +363,17 @@ class _Side:
 
 
 def _take_motion_out(
-    changes: Array, kept: Places, fitter: MotionFitter, unknown: MotionBasis, turns: Array
+    changes: Array, rows: slice | Places, fitter: MotionFitter, unknown: MotionBasis, turns: Array
 ) -> None:
     """Take initial states and trims out of derivatives, and add what their own turning leaves.
 
-    `changes`, shape (n_records, n_moved, n_out, n), are derivatives; `turns`, shape (n_records,
-    n_moved, n_unknowns), says how the residuals see the turning motions.
+    `changes`, shape (n_records, n_moved, n_out, n), are derivatives, `rows` the fitted outputs;
+    `turns`, shape (n_records, n_moved, n_unknowns), says how the residuals see the turning motions.
     """
-    at_once = max(1, AT_ONCE // max(changes[:, 0].size, 1))
-    for begin in range(0, changes.shape[1], at_once):
-        part = slice(begin, begin + at_once)
-        rest = changes[:, part, kept]
-        again = turns[:, part] @ fitter.normal - unknown.coefficients(fitter, rest)
-        changes[:, part, kept] = rest + unknown.moved(again)
+    for place, change in enumerate(changes):  # one record's stay near
+        rest = change[None, :, rows]
+        alone = fitter.of(place)
+        again = turns[place] @ alone.normal[0] - unknown.coefficients(alone, rest)[0]
+        rest[0] += unknown.moved(again)
+        if not isinstance(rows, slice):
+            change[:, rows] = rest[0]

@@ -44,6 +44,11 @@ class MotionFitter:
     alone: Array
     left_alone: Array
 
+    def of(self, record: int) -> MotionFitter:
+        """That of one record."""
+        parts = (self.gain, self.normal, self.scale, self.alone, self.left_alone)
+        return MotionFitter(*(each[record : record + 1] for each in parts))
+
 
 @dataclass(frozen=True)
 class MotionBasis:

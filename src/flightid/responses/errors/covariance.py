@@ -37,6 +37,8 @@ estimate: a Hann window's side lobes are down by 1e-9 in power there."""
 Complex = NDArray[np.complex128]
 Real = NDArray[np.float64]
 Places = NDArray[np.intp]
+_Mine = tuple[Places, Complex]
+"""Frequencies that some kernels reach, and the kernels there."""
 
 
 class SensitiveComposite(Protocol):
@@ -75,9 +77,14 @@ class WindowedErrors(JointErrors):
         inputs, frequencies = union(wanted)
         parts = [self._part(each, inputs, frequencies) for each in wanted]
         totals = [np.zeros(2 * (2 * len(each.inputs) * len(each.frequencies),)) for each in wanted]
+        points = [(each.inputs.tobytes(), each.frequencies.tobytes()) for each in wanted]
         for noise, kernels, near in self._kernels(inputs, frequencies):
-            for part, total in zip(parts, totals, strict=True):
-                part.add(kernels, near, noise.level[part.output], total)
+            # Outputs at the same points share their kernels.
+            mine: dict[tuple[bytes, bytes], _Mine] = {}
+            for part, place, total in zip(parts, points, totals, strict=True):
+                if place not in mine:
+                    mine[place] = part.reached(kernels, near)
+                part.add(mine[place], noise.level[part.output], total)
         return totals
 
     def combined(self, wanted: Sequence[Points], gains: Sequence[Real]) -> Real:
@@ -126,7 +133,8 @@ class WindowedErrors(JointErrors):
             for part, gain, each, products in zip(parts, gains, levels, found, strict=True):
                 if each is None:
                     continue
-                rows, points = part.weighted(kernels, near, noise.level[part.output])
+                mine = part.reached(kernels, near)
+                rows, points = part.weighted(mine, noise.level[part.output])
                 turned = (gain[:, points] @ rows).conj()
                 shares = each.shares(noise.omega_rad_s)
                 for level in np.flatnonzero(np.any(shares > 0.0, axis=1)):
@@ -264,30 +272,30 @@ class _Part:
         near : ndarray of int
             Frequencies, among all, that the kernels are for.
         """
-        here, mine = self._mine(kernels, near)
+        here, mine = self.reached(kernels, near)
         rows = self.mixing[:, here].transpose(2, 0, 1, 3).reshape(self.mixing.shape[2], -1)
         flat = mine.view(np.float64).reshape(rows.shape[1], 2 * kernels.shape[-1])
         return np.asarray((rows @ flat).view(np.complex128))
 
-    def add(self, kernels: Complex, near: Places, level: Real, total: Real) -> None:
+    def add(self, mine: _Mine, level: Real, total: Real) -> None:
         """Add the Gram matrix of the weighted kernels of all points to `total`."""
-        rows, places = self.weighted(kernels, near, level)
+        rows, places = self.weighted(mine, level)
         flat = rows.view(np.float64)
         if len(places) == len(total):  # most bins of noise reach all points
             total += flat @ flat.T
         else:
             total[places[:, None], places] += flat @ flat.T
 
-    def weighted(self, kernels: Complex, near: Places, level: Real) -> tuple[Complex, Places]:
+    def weighted(self, mine: _Mine, level: Real) -> tuple[Complex, Places]:
         """Kernels of all points at the noise's level, (n, n_bins), and the places of these rows."""
-        here, mine = self._mine(kernels, near)
-        mixed = self.mixing[:, here] @ mine.view(np.float64)
+        here, kernels = mine
+        mixed = self.mixing[:, here] @ kernels.view(np.float64)
         both = np.repeat(level, 2)
         flat = (mixed.transpose(2, 0, 1, 3) * both).reshape(-1, len(both))
         places = np.add.outer(np.arange(2 * len(self.inputs)) * len(self.frequencies), here).ravel()
         return flat.view(np.complex128), places
 
-    def _mine(self, kernels: Complex, near: Places) -> tuple[Places, Complex]:
+    def reached(self, kernels: Complex, near: Places) -> _Mine:
         """Which of the frequencies the kernels reach, and the kernels there."""
         first = near[0] if len(near) else np.inf  # all frequencies from one on
         here = np.flatnonzero(self.frequencies >= first)

@@ -180,12 +180,13 @@ def frames(samples: Real, plan: WindowPlan, detrend: str = "none") -> Real:
     return np.asarray(removed)
 
 
-def transform(samples: Real, basis: FoldedBasis) -> tuple[Real, Real]:
+def transform(samples: Real | Halves, basis: FoldedBasis) -> tuple[Real, Real]:
     """Transform of every window of every channel, time counted from the window's middle.
 
     Parameters
     ----------
-    samples : ndarray, shape (n_channels, n_samples)
+    samples : ndarray, shape (n_channels, n_samples), or Halves
+        As `Halves` for windows of several lengths.
     basis : FoldedBasis
 
     Returns
@@ -193,7 +194,8 @@ def transform(samples: Real, basis: FoldedBasis) -> tuple[Real, Real]:
     tuple of ndarray, each shape (n_f, n_channels, n_windows)
         Real and imaginary parts of ``Σ w(t) x(t) exp(−jωt)``.
     """
-    parts = transform_of([(Halves(samples), 0, basis.plan.count(samples.shape[1]))], basis)
+    halves = samples if isinstance(samples, Halves) else Halves(samples)
+    parts = transform_of([(halves, 0, basis.plan.count(halves.samples.shape[1]))], basis)
     real, imaginary = parts[:, 0].transpose(0, 2, 1), parts[:, 1].transpose(0, 2, 1)
     return real, imaginary
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
+from flightid.responses.windows.halving import Halves
 from flightid.responses.windows.kept_bases import basis_of
 from flightid.responses.windows.transform import FoldedBasis, WindowPlan, transform
 
@@ -71,18 +72,18 @@ class WindowWeights:
                 self._weights(record, share, basis, inputs, frequencies)
                 for share, basis in zip(self.shares, bases, strict=True)
             ]
-            for record in self.instruments
+            for record in map(Halves, self.instruments)
         ]
 
     def _weights(
         self,
-        record: Real,
+        record: Halves,
         share: WindowShare,
         basis: FoldedBasis,
         inputs: Places,
         frequencies: Places,
     ) -> Complex:
-        if not share.plan.count(record.shape[1]):
+        if not share.plan.count(record.samples.shape[1]):
             return np.zeros((len(inputs), len(frequencies), 0), dtype=np.complex128)
         real, imaginary = transform(record, basis)
         projection = share.projection[frequencies][:, inputs]
