@@ -44,6 +44,10 @@ pub trait Scalar:
     fn sqrt(self) -> Self;
     /// Power.
     fn power(self, exponent: Self) -> Self;
+    /// Power with a whole exponent, by products.
+    fn whole_power(self, exponent: i32) -> Self;
+    /// Times a number without derivative.
+    fn times(self, factor: f64) -> Self;
     /// Angle of the point (x, self).
     fn atan2(self, x: Self) -> Self;
 
@@ -87,6 +91,12 @@ impl Scalar for f64 {
     plain!(sin, cos, asin, acos, atan, sinh, cosh, tanh, exp, ln, sqrt, tan, abs);
     fn power(self, exponent: Self) -> Self {
         self.powf(exponent)
+    }
+    fn whole_power(self, exponent: i32) -> Self {
+        self.powi(exponent)
+    }
+    fn times(self, factor: f64) -> Self {
+        self * factor
     }
     fn atan2(self, x: Self) -> Self {
         f64::atan2(self, x)
@@ -228,6 +238,16 @@ impl<T: Scalar, const N: usize> Scalar for Dual<T, N> {
         let slope = exponent.value * self.value.power(exponent.value - one::<T>());
         self.chain2(exponent, value, slope, value * self.value.ln())
     }
+    fn whole_power(self, exponent: i32) -> Self {
+        if exponent == 0 {
+            return Self::constant(1.0);
+        }
+        let slope = self.value.whole_power(exponent - 1).times(f64::from(exponent));
+        self.chain(self.value.whole_power(exponent), slope)
+    }
+    fn times(self, factor: f64) -> Self {
+        Self { value: self.value.times(factor), gradient: self.gradient.map(|e| e.times(factor)) }
+    }
     fn atan2(self, x: Self) -> Self {
         let square = x.value * x.value + self.value * self.value;
         self.chain2(x, self.value.atan2(x.value), x.value / square, -self.value / square)
@@ -256,5 +276,16 @@ mod tests {
         assert_eq!(x.power(Dual::constant(2.0)).gradient, [0.0]);
         assert_eq!(x.power(Dual::constant(1.0)).gradient, [1.0]);
         assert_eq!(x.power(Dual::constant(0.0)).gradient, [0.0]);
+        assert_eq!([2, 1, 0].map(|k| x.whole_power(k).gradient), [[0.0], [1.0], [0.0]]);
+    }
+
+    #[test]
+    fn whole_powers_and_multiples_are_those_of_constants() {
+        type Inner = Dual<f64, 2>;
+        let x = Dual::<Inner, 1>::variable(Inner::variable(-1.25, 1), 0);
+        for whole in [-3, -1, 0, 1, 2, 3, 6] {
+            assert_eq!(x.whole_power(whole), x.power(Dual::constant(f64::from(whole))));
+        }
+        assert_eq!(x.times(0.5), x * Dual::constant(0.5));
     }
 }

@@ -110,7 +110,13 @@ impl Tape {
                 Operation::Input(place) => inputs[place],
                 Operation::Unary(function, a) => apply_unary(function, registers[a]),
                 Operation::Binary(function, a, b) => {
-                    apply_binary(function, registers[a], registers[b])
+                    let power = (function == Binary::Power)
+                        .then(|| self.operations[b].whole_exponent())
+                        .flatten();
+                    match power {
+                        Some(power) => registers[a].whole_power(power),
+                        None => apply_binary(function, registers[a], registers[b]),
+                    }
                 }
                 Operation::Select(test, a, b) => {
                     registers[if registers[test].real() == 0.0 { b } else { a }]

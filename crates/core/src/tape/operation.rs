@@ -4,6 +4,9 @@ use crate::language::lookup_table::Part;
 use crate::language::syntax::{Binary, Unary};
 use crate::numerics::dual::Scalar;
 
+/// Largest exponent whose power is made by products: beyond it they are no faster.
+const LARGEST_WHOLE: f64 = 64.0;
+
 /// One entry of a tape; its arguments are the registers of earlier entries.
 #[derive(Debug, Clone, Copy)]
 pub(crate) enum Operation {
@@ -27,6 +30,16 @@ impl Operation {
             Self::Select(test, a, b) => (Some(test), Some(a), Some(b)),
         };
         a.into_iter().chain(b).chain(c)
+    }
+
+    /// The exponent that it is, where products make the power of it.
+    pub(crate) fn whole_exponent(&self) -> Option<i32> {
+        match *self {
+            Self::Constant(power) if power.fract() == 0.0 && power.abs() <= LARGEST_WHOLE => {
+                Some(power as i32)
+            }
+            _ => None,
+        }
     }
 
     /// The same operation where its arguments have other places.

@@ -276,12 +276,10 @@ fn step(tape: &Tape, fusions: &Fusions, places: &[usize], register: usize) -> Op
         Operation::Binary(Binary::Subtract, a, b) => Step::Subtract(to, short(a), short(b)),
         Operation::Binary(Binary::Multiply, a, b) => Step::Multiply(to, short(a), short(b)),
         Operation::Binary(Binary::Divide, a, b) => Step::Divide(to, short(a), short(b)),
-        Operation::Binary(Binary::Power, a, b) => match tape.operations[b] {
-            Operation::Constant(2.0) => Step::Multiply(to, short(a), short(a)),
-            Operation::Constant(power) if power.fract() == 0.0 && power.abs() <= 64.0 => {
-                Step::Integer(to, short(a), power as i32)
-            }
-            _ => Step::Binary(Binary::Power, to, short(a), short(b)),
+        Operation::Binary(Binary::Power, a, b) => match tape.operations[b].whole_exponent() {
+            Some(2) => Step::Multiply(to, short(a), short(a)),
+            Some(power) => Step::Integer(to, short(a), power),
+            None => Step::Binary(Binary::Power, to, short(a), short(b)),
         },
         Operation::Binary(function, a, b) => Step::Binary(function, to, short(a), short(b)),
         Operation::Select(test, a, b) => Step::Select(to, short(test), short(a), short(b)),
