@@ -120,11 +120,16 @@ def test_slopes_are_those_of_the_filter() -> None:
     _, priors, densities, variances = np.split(ahead, np.cumsum([n, size, 2]), axis=1)
     turned[:, range(size), range(size)] = priors
     values, prior, process, variance = np.split(at, np.cumsum([n, size, 2]))
-    white, logs = _native.extended_filter_slopes(
+    given = (
         model.native, values, inputs, measured, (0.02, "zero", 2),
         (np.full(size, 0.1), np.diag(prior), *constants), (process, variance),
-        tuple(map(np.ascontiguousarray, (ahead[:, :n], turned, densities, variances))),
     )  # fmt: skip
+    run, (white, logs) = _native.extended_filter_slopes(
+        *given,
+        tuple(map(np.ascontiguousarray, (ahead[:, :n], turned, densities, variances))),
+    )
+    for part, alone in zip(sum(run, ()), sum(_native.extended_filter(*given), ()), strict=True):
+        assert_close(part, alone, rtol=0.0, atol=1e-14 * np.abs(alone).max(), why="same values")
     for place, direction in enumerate(ahead):
         step = 1e-6 * max(abs(at[place]), 0.01)
         above, below = found(at + step * direction), found(at - step * direction)

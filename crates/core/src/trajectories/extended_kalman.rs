@@ -18,7 +18,7 @@ pub use crate::trajectories::filter_step::Constants;
 use crate::trajectories::filter_step::Step;
 use crate::trajectories::runge_kutta::{Course, LARGEST_STATE, check, expect};
 use crate::trajectories::scalar_equations::EquationTapes;
-use crate::trajectories::state_covariance::{correct, spread};
+use crate::trajectories::state_covariance::Correction;
 
 /// Directions that are differentiated side by side.
 const LANES: usize = 8;
@@ -49,6 +49,15 @@ pub struct Filtered {
     pub triangles: Vec<f64>,
     /// Predicted states and constants.
     pub states: Vec<f64>,
+}
+
+impl Filtered {
+    fn keep<S: Scalar>(&mut self, state: &[S], innovation: &[S], triangle: &[S]) {
+        let real = |values: &mut Vec<f64>, new: &[S]| values.extend(new.iter().map(|s| s.real()));
+        real(&mut self.states, state);
+        real(&mut self.innovations, innovation);
+        real(&mut self.triangles, triangle);
+    }
 }
 
 /// Innovations in units of their own deviations.
@@ -86,16 +95,12 @@ pub fn filter(
     work.check(belief)?;
     let start = Start::of(belief, |values, _| values.to_vec());
     let mut found = Filtered::default();
-    let white = work.run(start, &mut |state, innovation, triangle| {
-        found.states.extend(state);
-        found.innovations.extend(innovation);
-        found.triangles.extend(triangle);
-    })?;
+    let white = work.run(start, Some(&mut found))?;
     Ok((found, white))
 }
 
-/// Whitened innovations and their derivatives along `directions`, each of the form of a belief. The
-/// same bits for any number of threads; cut short where `stop` says so.
+/// What `filter` finds, and derivatives of the whitened innovations along `directions`, each of the form
+/// of a belief. The same bits for any number of threads; cut short where `stop` says so.
 ///
 /// # Errors
 /// As `filter`.
@@ -107,12 +112,13 @@ pub fn slopes(
     constants: &Constants<'_>,
     directions: &[Belief<'_>],
     stop: &(dyn Fn() -> bool + Sync),
-) -> Result<Slopes, CoreError> {
+) -> Result<(Filtered, Whitened<f64>, Slopes), CoreError> {
     let tapes = EquationTapes::new(model)?;
     let work = Work { tapes: &tapes, course, measured, constants, stop };
     work.check(belief)?;
     directions.iter().try_for_each(|each| work.check(each))?;
-    let one = |group: &[Belief<'_>]| {
+    let one = |place: usize| {
+        let group = &directions[place * LANES..directions.len().min((place + 1) * LANES)];
         let start = Start::of(belief, |values, part| {
             let dual = |(place, &value): (usize, &f64)| {
                 let slope = |lane: usize| group.get(lane).map_or(0.0, |each| part(each)[place]);
@@ -120,10 +126,13 @@ pub fn slopes(
             };
             values.iter().enumerate().map(dual).collect()
         });
-        work.run(start, &mut |_, _, _| ())
+        // Values are the same in all groups: the first one keeps them.
+        let mut kept = Filtered::default();
+        Ok((work.run(start, (place == 0).then_some(&mut kept))?, kept))
     };
-    let found: Vec<Whitened<Dual<f64, LANES>>> =
-        directions.par_chunks(LANES).map(one).collect::<Result<_, _>>()?;
+    let groups = directions.len().div_ceil(LANES).max(1);
+    let (found, kept): (Vec<Whitened<Dual<f64, LANES>>>, Vec<Filtered>) =
+        (0..groups).into_par_iter().map(one).collect::<Result<_, CoreError>>()?;
     let rows = |part: fn(&Whitened<Dual<f64, LANES>>) -> &[Dual<f64, LANES>]| -> Vec<f64> {
         let length = found.iter().map(|each| part(each).len()).min().unwrap_or(0);
         let entry = |place: usize| part(&found[place % directions.len() / LANES]);
@@ -134,7 +143,10 @@ pub fn slopes(
             })
             .collect()
     };
-    Ok(Slopes { white: rows(|each| &each.white), logs: rows(|each| &each.logs) })
+    let real = |part: &[Dual<f64, LANES>]| part.iter().map(|each| each.value).collect();
+    let values = Whitened { white: real(&found[0].white), logs: real(&found[0].logs) };
+    let slopes = Slopes { white: rows(|each| &each.white), logs: rows(|each| &each.logs) };
+    Ok((kept.into_iter().next().unwrap_or_default(), values, slopes))
 }
 
 /// A belief on any scalar.
@@ -169,8 +181,6 @@ struct Work<'a> {
     stop: &'a (dyn Fn() -> bool + Sync),
 }
 
-type Keep<'a, S> = &'a mut dyn FnMut(&[S], &[S], &[S]);
-
 impl Work<'_> {
     fn check(&self, belief: &Belief<'_>) -> Result<(), CoreError> {
         let (n, p) = (self.tapes.n_states, self.tapes.n_outputs);
@@ -184,9 +194,14 @@ impl Work<'_> {
         expect("measured outputs", self.measured.len(), self.course.n_samples * p)
     }
 
-    /// `keep` takes predicted state, innovations and triangle of each sample.
-    fn run<S: Scalar>(&self, start: Start<S>, keep: Keep<'_, S>) -> Result<Whitened<S>, CoreError> {
+    /// `kept` takes predicted state, innovations and triangle of each sample.
+    fn run<S: Scalar>(
+        &self,
+        start: Start<S>,
+        mut kept: Option<&mut Filtered>,
+    ) -> Result<Whitened<S>, CoreError> {
         let (course, p) = (self.course, self.tapes.n_outputs);
+        let mut correction = Correction::new();
         let mut step = Step::new(self.tapes, self.course, self.constants, &start.parameters)?;
         let (mut state, mut covariance) = (start.state, start.covariance);
         let mut logs = vec![S::constant(0.0); p];
@@ -195,22 +210,23 @@ impl Work<'_> {
             if sample % WATCH == 0 && (self.stop)() {
                 break;
             }
-            let innovation = step.measure(sample, &state, seen)?;
+            step.measure(sample, &state, seen)?;
             let last = sample + 1 == course.n_samples;
             if !last {
                 step.differentiate(sample, &state)?;
             }
-            let before = state.clone();
-            let (triangle, whitened) = correct(
-                &mut state,
-                &mut covariance,
+            correction.prepare(
+                &covariance,
                 &step.observed,
-                &innovation,
+                &step.innovation,
                 &start.measurement,
             )?;
-            keep(&before, &innovation, &triangle);
-            (0..p).for_each(|k| logs[k] = logs[k] + triangle[k * p + k].ln());
-            white.extend(whitened);
+            if let Some(kept) = &mut kept {
+                kept.keep(&state, &step.innovation, &correction.triangle);
+            }
+            correction.apply(&mut state, &mut covariance);
+            (0..p).for_each(|k| logs[k] = logs[k] + correction.triangle[k * p + k].ln());
+            white.extend_from_slice(&correction.white);
             if last {
                 break;
             }
@@ -218,10 +234,16 @@ impl Work<'_> {
             if !state.iter().all(|value| value.real().abs() < LARGEST_STATE) {
                 return Err(CoreError::Diverged { sample });
             }
-            spread(&mut covariance, &step.transition, &start.process, course.sample_s, state.len());
+            correction.spread(
+                &mut covariance,
+                &step.transition,
+                &start.process,
+                course.sample_s,
+                state.len(),
+            );
         }
-        let share = S::constant(1.0 / course.n_samples as f64);
-        logs.iter_mut().for_each(|log| *log = *log * share);
+        let share = 1.0 / course.n_samples as f64;
+        logs.iter_mut().for_each(|log| *log = log.times(share));
         Ok(Whitened { white, logs })
     }
 }

@@ -25,10 +25,56 @@ pub(crate) struct Step<'a, S> {
     shifted: &'a [usize],
     biased: &'a [usize],
     driven: Vec<S>,
+    own: Followed<S>,
+    all: Followed<S>,
+    /// Innovations of the sample that was measured.
+    pub(crate) innovation: Vec<S>,
     /// Derivatives of the outputs by states and constants.
     pub(crate) observed: Vec<Factor<S>>,
     /// Those of the next state by states and shifts (n × inner).
     pub(crate) transition: Vec<S>,
+}
+
+/// What follows rates over an interval: where it stands, is moved to, goes, and the stages' sum.
+#[derive(Debug, Clone)]
+struct Followed<S> {
+    at: Vec<S>,
+    moved: Vec<S>,
+    rate: Vec<S>,
+    sum: Vec<S>,
+}
+
+impl<S> Default for Followed<S> {
+    fn default() -> Self {
+        Self { at: Vec::new(), moved: Vec::new(), rate: Vec::new(), sum: Vec::new() }
+    }
+}
+
+impl<S: Scalar> Followed<S> {
+    fn start(&mut self, from: impl Iterator<Item = S>) {
+        self.at.clear();
+        self.at.extend(from);
+        self.rate.resize(self.at.len(), S::constant(0.0));
+    }
+
+    /// Go to a stage of a step.
+    fn stage(&mut self, stage: usize, by: f64) {
+        self.moved.clone_from(&self.at);
+        if stage == 0 {
+            self.sum.clear();
+            self.sum.resize(self.at.len(), S::constant(0.0));
+        } else {
+            add(&mut self.moved, &self.rate, by);
+        }
+    }
+
+    /// Take the stage's rate into account, at the last one move.
+    fn staged(&mut self, stage: usize, step: f64) {
+        add(&mut self.sum, &self.rate, WEIGHTS[stage]);
+        if stage + 1 == WEIGHTS.len() {
+            add(&mut self.at, &self.sum, step / 6.0);
+        }
+    }
 }
 
 impl<'a, S: Scalar> Step<'a, S> {
@@ -52,6 +98,9 @@ impl<'a, S: Scalar> Step<'a, S> {
             shifted: constants.shifted,
             biased: constants.biased,
             driven: vec![S::constant(0.0); tapes.n_inputs],
+            own: Followed::default(),
+            all: Followed::default(),
+            innovation: Vec::new(),
             observed: Vec::new(),
             transition: Vec::new(),
         })
@@ -63,7 +112,7 @@ impl<'a, S: Scalar> Step<'a, S> {
             let (value, by_delay) = at(held);
             let delay = self.equations.delays[input];
             // A number whose value is zero and whose derivatives are those of the delay.
-            let moved = (delay - S::constant(delay.real())) * S::constant(by_delay);
+            let moved = (delay - S::constant(delay.real())).times(by_delay);
             self.driven[input] = S::constant(value) + moved;
         }
         let n = self.equations.tapes.n_states;
@@ -78,14 +127,15 @@ impl<'a, S: Scalar> Step<'a, S> {
         sample: usize,
         state: &[S],
         seen: &[f64],
-    ) -> Result<Vec<S>, CoreError> {
+    ) -> Result<(), CoreError> {
         let n = self.equations.tapes.n_states;
         let inner = n + self.shifted.len();
         self.drive(state, |held| held.samples[sample]);
         let mut observed = std::mem::take(&mut self.observed);
         let outputs = self.equations.measure(&state[..n], &self.driven, &mut observed)?;
-        let mut innovation: Vec<S> =
-            seen.iter().zip(outputs).map(|(&seen, &output)| S::constant(seen) - output).collect();
+        let left = seen.iter().zip(outputs).map(|(&seen, &output)| S::constant(seen) - output);
+        self.innovation.clear();
+        self.innovation.extend(left);
         observed.retain_mut(|each| {
             let shift = self.shifted.iter().position(|input| n + input == each.column);
             let kept = each.column < n || shift.is_some();
@@ -94,43 +144,34 @@ impl<'a, S: Scalar> Step<'a, S> {
         });
         for (k, &row) in self.biased.iter().enumerate() {
             observed.push(Factor { row, column: inner + k, value: S::constant(1.0) });
-            innovation[row] = innovation[row] - state[inner + k];
+            self.innovation[row] = self.innovation[row] - state[inner + k];
         }
         self.observed = observed;
-        Ok(innovation)
+        Ok(())
     }
 
     /// Transition over a sample interval from a state.
     pub(crate) fn differentiate(&mut self, sample: usize, state: &[S]) -> Result<(), CoreError> {
         let n = self.equations.tapes.n_states;
         let inner = n + self.shifted.len();
-        let zero = S::constant(0.0);
-        let mut x = state[..n].to_vec();
-        let mut made = vec![zero; n * inner];
-        (0..n).for_each(|i| made[i * inner + i] = S::constant(1.0));
-        let (mut x_rate, mut rate) = (vec![zero; n], vec![zero; n * inner]);
-        let (mut x_moved, mut moved) = (x.clone(), made.clone());
+        let (mut own, mut all) = (std::mem::take(&mut self.own), std::mem::take(&mut self.all));
+        own.start(state[..n].iter().copied());
+        let one = |place: usize| f64::from(u8::from(place / inner == place % inner));
+        all.start((0..n * inner).map(|place| S::constant(one(place))));
         for part in sample * self.substeps..(sample + 1) * self.substeps {
-            let (mut x_sum, mut sum) = (vec![zero; n], vec![zero; n * inner]);
             for (stage, (place, share)) in STAGES.into_iter().enumerate() {
                 self.drive(state, |held| held.steps[part].at(place));
-                if stage > 0 {
-                    ahead(&mut x_moved, &x, &x_rate, share * self.step);
-                    ahead(&mut moved, &made, &rate, share * self.step);
-                } else {
-                    x_moved.copy_from_slice(&x);
-                    moved.copy_from_slice(&made);
-                }
-                self.equations.differentiate(&x_moved, &self.driven)?;
-                x_rate.copy_from_slice(&self.equations.rate);
-                self.slope(&moved, &mut rate);
-                add(&mut x_sum, &x_rate, WEIGHTS[stage]);
-                add(&mut sum, &rate, WEIGHTS[stage]);
+                own.stage(stage, share * self.step);
+                all.stage(stage, share * self.step);
+                self.equations.differentiate(&own.moved, &self.driven)?;
+                own.rate.copy_from_slice(&self.equations.rate);
+                self.slope(&all.moved, &mut all.rate);
+                own.staged(stage, self.step);
+                all.staged(stage, self.step);
             }
-            add(&mut x, &x_sum, self.step / 6.0);
-            add(&mut made, &sum, self.step / 6.0);
         }
-        self.transition = made;
+        self.transition.clone_from(&all.at);
+        (self.own, self.all) = (own, all);
         Ok(())
     }
 
@@ -155,34 +196,25 @@ impl<'a, S: Scalar> Step<'a, S> {
     /// Move a state over a sample interval.
     pub(crate) fn advance(&mut self, sample: usize, state: &mut [S]) -> Result<(), CoreError> {
         let n = self.equations.tapes.n_states;
-        let zero = S::constant(0.0);
-        let (mut rate, mut moved) = (vec![zero; n], state[..n].to_vec());
+        let mut own = std::mem::take(&mut self.own);
+        own.start(state[..n].iter().copied());
         for part in sample * self.substeps..(sample + 1) * self.substeps {
-            let mut sum = vec![zero; n];
             for (stage, (place, share)) in STAGES.into_iter().enumerate() {
                 self.drive(state, |held| held.steps[part].at(place));
-                match stage {
-                    0 => moved.copy_from_slice(&state[..n]),
-                    _ => ahead(&mut moved, &state[..n], &rate, share * self.step),
-                }
-                self.equations.evaluate(&moved, &self.driven)?;
-                rate.copy_from_slice(&self.equations.rate);
-                add(&mut sum, &rate, WEIGHTS[stage]);
+                own.stage(stage, share * self.step);
+                self.equations.evaluate(&own.moved, &self.driven)?;
+                own.rate.copy_from_slice(&self.equations.rate);
+                own.staged(stage, self.step);
             }
-            add(&mut state[..n], &sum, self.step / 6.0);
         }
+        state[..n].copy_from_slice(&own.at);
+        self.own = own;
         Ok(())
-    }
-}
-
-fn ahead<S: Scalar>(to: &mut [S], from: &[S], rate: &[S], step: f64) {
-    for ((to, &from), &rate) in to.iter_mut().zip(from).zip(rate) {
-        *to = from + S::constant(step) * rate;
     }
 }
 
 fn add<S: Scalar>(to: &mut [S], what: &[S], share: f64) {
     for (to, &what) in to.iter_mut().zip(what) {
-        *to = *to + S::constant(share) * what;
+        *to = *to + what.times(share);
     }
 }

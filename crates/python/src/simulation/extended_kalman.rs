@@ -1,7 +1,9 @@
 //! Face of `flightid_core::trajectories::extended_kalman`. (Python side:
 //! identification/filter_error/extended_kalman.py)
 
-use flightid_core::trajectories::extended_kalman::{Belief, Constants, filter, slopes};
+use flightid_core::trajectories::extended_kalman::{
+    Belief, Constants, Filtered, Whitened, filter, slopes,
+};
 use flightid_core::trajectories::runge_kutta::Course;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -17,6 +19,7 @@ type Found<'py> = (
     (Matrix<'py>, Bound<'py, PyArray3<f64>>, Matrix<'py>),
     (Matrix<'py>, Bound<'py, PyArray1<f64>>),
 );
+type FoundWithSlopes<'py> = (Found<'py>, (Matrix<'py>, Matrix<'py>));
 type Start<'py> = (RowMajor1<'py, f64>, RowMajor2<'py, f64>, Vec<usize>, Vec<usize>);
 type Ahead<'py> =
     (RowMajor2<'py, f64>, RowMajor3<'py, f64>, RowMajor2<'py, f64>, RowMajor2<'py, f64>);
@@ -49,21 +52,14 @@ fn extended_filter<'py>(
     let (p, size) = (tape.n_outputs(), belief.state.len());
     let (found, white) =
         py.detach(|| filter(tape, &course, measured, &belief, &constants)).map_err(from_core)?;
-    Ok((
-        (
-            found.innovations.into_pyarray(py).reshape([n_samples, p])?,
-            found.triangles.into_pyarray(py).reshape([n_samples, p, p])?,
-            found.states.into_pyarray(py).reshape([n_samples, size])?,
-        ),
-        (white.white.into_pyarray(py).reshape([n_samples, p])?, white.logs.into_pyarray(py)),
-    ))
+    shaped(py, (found, white), (n_samples, p, size))
 }
 
-/// extended_filter_slopes(model: StateSpace, values: NDArray[np.float64], inputs: NDArray[np.float64], measured: NDArray[np.float64], sampling: tuple[float, str, int], start: tuple[NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int]], noise: tuple[NDArray[np.float64], NDArray[np.float64]], ahead: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]) -> tuple[NDArray[np.float64], NDArray[np.float64]]
+/// extended_filter_slopes(model: StateSpace, values: NDArray[np.float64], inputs: NDArray[np.float64], measured: NDArray[np.float64], sampling: tuple[float, str, int], start: tuple[NDArray[np.float64], NDArray[np.float64], Sequence[int], Sequence[int]], noise: tuple[NDArray[np.float64], NDArray[np.float64]], ahead: tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]) -> tuple[tuple[tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]], tuple[NDArray[np.float64], NDArray[np.float64]]]
 ///
-/// Exact derivatives of the whitened innovations (n_samples p, k) and of the mean logarithms (p, k)
-/// that `extended_filter` finds, along k directions: how values (k, n), the covariance of the start
-/// (k, size, size), densities (k, n_states) and variances (k, p) change.
+/// What `extended_filter` finds, and exact derivatives of the whitened innovations (n_samples p, k)
+/// and of the mean logarithms (p, k) along k directions: how values (k, n), the covariance of the
+/// start (k, size, size), densities (k, n_states) and variances (k, p) change.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
 fn extended_filter_slopes<'py>(
@@ -76,7 +72,7 @@ fn extended_filter_slopes<'py>(
     start: Start<'py>,
     noise: (RowMajor1<'py, f64>, RowMajor1<'py, f64>),
     ahead: Ahead<'py>,
-) -> PyResult<(Matrix<'py>, Matrix<'py>)> {
+) -> PyResult<FoundWithSlopes<'py>> {
     let (sample_s, hold, substeps) = (sampling.0, named(&sampling.1)?, sampling.2);
     let n_samples = inputs.as_array().ncols();
     let course = Course { inputs: inputs.as_slice()?, n_samples, sample_s, hold, substeps };
@@ -100,11 +96,29 @@ fn extended_filter_slopes<'py>(
     let work = |stop: crate::interrupt::Stop<'_>| {
         slopes(tape, &course, measured, &belief, &constants, &directions, stop)
     };
-    let found = run_beside(py, work)?.map_err(from_core)?;
+    let (found, white, ahead) = run_beside(py, work)?.map_err(from_core)?;
     let p = tape.n_outputs();
     Ok((
-        found.white.into_pyarray(py).reshape([n_samples * p, count])?,
-        found.logs.into_pyarray(py).reshape([p, count])?,
+        shaped(py, (found, white), (n_samples, p, belief.state.len()))?,
+        (
+            ahead.white.into_pyarray(py).reshape([n_samples * p, count])?,
+            ahead.logs.into_pyarray(py).reshape([p, count])?,
+        ),
+    ))
+}
+
+fn shaped<'py>(
+    py: Python<'py>,
+    (found, white): (Filtered, Whitened<f64>),
+    (n_samples, p, size): (usize, usize, usize),
+) -> PyResult<Found<'py>> {
+    Ok((
+        (
+            found.innovations.into_pyarray(py).reshape([n_samples, p])?,
+            found.triangles.into_pyarray(py).reshape([n_samples, p, p])?,
+            found.states.into_pyarray(py).reshape([n_samples, size])?,
+        ),
+        (white.white.into_pyarray(py).reshape([n_samples, p])?, white.logs.into_pyarray(py)),
     ))
 }
 

@@ -42,6 +42,8 @@ _Given = tuple[
     tuple[Array, Array, list[int], list[int]],
     tuple[Array, Array],
 ]
+_Run = tuple[tuple[Array, Array, Array], tuple[Array, Array]]
+"""Innovations, their triangles and predicted states; whitened innovations and mean logarithms."""
 
 
 @dataclass(frozen=True)
@@ -91,13 +93,39 @@ class ExtendedProblem(InnovationsProblem):
     def records(self, unknowns: Array, *, with_slopes: bool) -> list[Filtered]:
         """Innovations of every record; slopes come with `residuals` alone."""
         del with_slopes
-        return [(self._found(place, unknowns), None) for place in range(len(self.data))]
+        return [
+            (self._found(place, *self._filtered(place, unknowns)), None)
+            for place in range(len(self.data))
+        ]
 
-    def _found(self, place: int, unknowns: Array) -> RecordInnovations:
+    @cached_property
+    def _last(self) -> dict[int, tuple[bytes, tuple[_Given, _Run]]]:
+        """What each record's last run found, and where: evidence asks for it after its slopes."""
+        return {}
+
+    def _filtered(self, place: int, unknowns: Array) -> tuple[_Given, _Run]:
+        """What the filter of one record is given and finds."""
+        at = unknowns.tobytes()
+        kept = self._last.get(place)
+        if kept is None or kept[0] != at:
+            given = self._given(place, unknowns)
+            kept = at, (given, _native.extended_filter(*given))
+            self._last[place] = kept
+        return kept[1]
+
+    def _with_slopes(self, place: int, unknowns: Array) -> tuple[_Run, tuple[Array, Array]]:
+        """The same with slopes of the whitened innovations and of the logarithms."""
+        given = self._given(place, unknowns)
+        ahead = self._ahead(self._seen[place], given)
+        run, slopes = _native.extended_filter_slopes(*given, ahead)
+        self._last[place] = unknowns.tobytes(), (given, run)
+        return run, slopes
+
+    def _found(self, place: int, given: _Given, run: _Run) -> RecordInnovations:
         """One record as it is kept."""
-        given, (p, n_samples) = self._given(place, unknowns), self.data[place].outputs.shape
+        p, n_samples = self.data[place].outputs.shape
         start, prior, shifted, _ = given[-2]
-        (innovations, triangles, states), _ = _native.extended_filter(*given)
+        (innovations, triangles, states), _ = run
         n = len(self.model.states)
         late = triangles[n_samples // 2 :]
         usual = np.mean(late @ late.swapaxes(1, 2), axis=0)
@@ -165,15 +193,15 @@ class ExtendedProblem(InnovationsProblem):
         total = sum(each.outputs.size for each in self.data)
         white, logs, turned, moved = [], [], [], []
         try:
-            for place, seen in enumerate(self._seen):
-                given = self._given(place, unknowns)
-                _, (found, log) = _native.extended_filter(*given)
-                white.append(found.ravel())
-                logs.append(log)
+            for place in range(len(self.data)):
                 if with_slopes:
-                    slopes = _native.extended_filter_slopes(*given, self._ahead(seen, given))
+                    (_, (found, log)), slopes = self._with_slopes(place, unknowns)
                     turned.append(slopes[0])
                     moved.append(slopes[1])
+                else:
+                    _, (_, (found, log)) = self._filtered(place, unknowns)
+                white.append(found.ravel())
+                logs.append(log)
         except (FlightidError, np.linalg.LinAlgError):
             return np.full(size, np.nan), np.full((size, self.n_all), np.nan)
         factor = float(np.exp(np.sum(lengths[:, None] * np.array(logs)) / total))
