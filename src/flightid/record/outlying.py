@@ -12,6 +12,11 @@ NORMAL_MAD = 1.4826
 """Standard deviation of normal noise over its median absolute deviation."""
 MOST = 0.1
 """Share of a channel that may be bridged: more is no outlier but the signal."""
+HALF_WIDTH = 3
+FAR, FAR_FROM_NEIGHBOURS, NEIGHBOURS = 12.0, 5.0, 12
+"""A spike lies so many robust deviations, and so many times its neighbours, from its median."""
+HARMFUL = 0.5
+"""Least height of a spike over the range of the middle 98 %."""
 
 
 def bridge_outliers(
@@ -82,10 +87,33 @@ def bridge_outliers(
     return np.where(bad, np.interp(time_s, time_s[good], samples[good]), samples), count
 
 
-def none_stands_out(away: NDArray[np.float64], deviations: float) -> bool:
-    """Whether no distance exceeds so many robust deviations, as far as a count can tell."""
-    near = float(away.max()) / (NORMAL_MAD * deviations) * (1.0 + 1e-9)
-    return 2 * int(np.count_nonzero(away > near)) > away.size + 1
+def alone(
+    values: NDArray[np.float64],
+) -> tuple[NDArray[np.intp], NDArray[np.float64], float]:
+    """Samples that stand alone; all distances from the median of their neighbours; their spread."""
+    away = distances(values, HALF_WIDTH)
+    low, high = np.percentile(values, [1, 99])
+    beyond = away > HARMFUL * (high - low)
+    if not beyond.any():
+        return np.empty(0, dtype=np.intp), away, 0.0
+    spread = spread_of(away)
+    tall = beyond & (away > FAR * spread)
+    if not tall.any():
+        return np.empty(0, dtype=np.intp), away, spread
+    # The largest of the neighbours, without the few samples that a spike may last.
+    around = _largest_near(np.where(tall, 0.0, away), NEIGHBOURS)
+    crowd = np.convolve(tall, np.ones(2 * (NEIGHBOURS + HALF_WIDTH) + 1), mode="same")
+    found = tall & (away > FAR_FROM_NEIGHBOURS * around) & (crowd <= HALF_WIDTH)
+    return np.flatnonzero(found), away, spread
+
+
+def _largest_near(values: NDArray[np.float64], half: int) -> NDArray[np.float64]:
+    """Largest of each sample and `half` neighbours on either side: spans doubled, two joined."""
+    largest, width, whole = np.pad(values, half, mode="edge"), 1, 2 * half + 1
+    while 2 * width <= whole:
+        largest, width = np.maximum(largest[:-width], largest[width:]), 2 * width
+    n, rest = len(values), whole - width
+    return np.maximum(largest[:n], largest[rest : rest + n])
 
 
 def distances(samples: NDArray[np.float64], half_width: int) -> NDArray[np.float64]:

@@ -8,15 +8,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.conventions import Light, Role
 from flightid.findings import Finding, counted
 from flightid.frozen import dataclass
 from flightid.record.commanded_edges import Surroundings, answered, answers
-from flightid.record.outlying import distances, none_stands_out, spread_of
+from flightid.record.outlying import FAR, HALF_WIDTH, HARMFUL, NORMAL_MAD, alone
 from flightid.record.repeats import measured_rows, rests_within_a_count, stands_still
 from flightid.units import DIMENSIONLESS, is_convertible, si_base
 
@@ -25,11 +27,6 @@ TOLD = 4
 """Instants of samples that are named."""
 FEWEST = 50
 """Samples below which nothing is judged."""
-HALF_WIDTH = 3
-FAR, FAR_FROM_NEIGHBOURS, NEIGHBOURS = 12.0, 5.0, 12
-"""A spike lies so many robust deviations, and so many times its neighbours, from its median."""
-HARMFUL = 0.5
-"""Least height of a spike over the range of the middle 98 %."""
 RED_SHARE = 0.05
 """Share of a channel's variance, or of its samples, from which a fault is red."""
 DEAD_SAMPLES, DEAD_SHARE, NOISY = 20, 0.01, 0.3
@@ -39,7 +36,7 @@ the median one."""
 LIMIT_SHARE, LIMIT_RUN, LIMIT_RUNS, LEVELS = 0.01, 3, 3, 30
 MOST_PLACES = 50
 """Stretches of one fault that are told apart; nearer ones are joined."""
-TURN = 2.0 * np.pi
+TURN, NEAR_TURN = 2.0 * np.pi, 0.05
 ALONE = Surroundings()
 
 
@@ -102,18 +99,46 @@ def sample_faults(
     >>> [fault.finding.code for fault in sample_faults("y", t, y, unit="1", role=Role.OUTPUT)]
     ['spikes']
     """
-    present = np.isfinite(samples) & np.isfinite(time_s)
-    stamps, values = time_s, samples
-    if not present.all():
+    stamps, values, signs = time_s, samples, _Signs.of(time_s, samples)
+    if not signs.is_finite:
+        present = np.isfinite(samples) & np.isfinite(time_s)
         stamps, values = time_s[present], samples[present]
-    if values.size < FEWEST or np.ptp(values) == 0.0:
+        signs = _Signs.of(stamps, values)
+    if values.size < FEWEST or signs.range == 0.0:
         return []
+    spikes, rests = _spikes, [_dead, _held, _clipped]
     if role in (Role.INPUT, Role.EXCITATION):
-        checks = [_input_spikes, _wraps]
-    else:
-        checks = [_spikes, _wraps, _dead, _held, _clipped]
-    channel = _ExaminedChannel(name, stamps, values, unit, role, around)
+        spikes, rests = _input_spikes, []
+    checks = [*([spikes] if signs.stands_out else []), _wraps, *(rests if signs.rests else [])]
+    channel = _ExaminedChannel(name, stamps, values, unit, role, around, signs)
     return [fault for check in checks if (fault := check(channel))]
+
+
+class _Signs(NamedTuple):
+    """What one reading of a channel tells: most need no closer look.
+
+    Attributes
+    ----------
+    is_finite : bool
+        Nothing else is known where it is not.
+    range : float
+    rests : bool
+        Whether any sample is that before.
+    largest_step : float
+        From a sample to the next.
+    stands_out : bool
+        Whether any may be `FAR` robust deviations from the median of its neighbours.
+    """
+
+    is_finite: bool
+    range: float
+    rests: bool
+    largest_step: float
+    stands_out: bool
+
+    @classmethod
+    def of(cls, stamps: Array, values: Array) -> _Signs:
+        return cls(*_native.sample_signs(stamps, values, HALF_WIDTH, NORMAL_MAD * FAR))
 
 
 @dataclass(frozen=True)
@@ -126,11 +151,14 @@ class _ExaminedChannel:
     unit: str
     role: Role
     around: Surroundings
+    signs: _Signs
 
     @cached_property
     def alone(self) -> tuple[NDArray[np.intp], Array, float]:
         """Samples alone; distances of all from the median of their neighbours; their spread."""
-        return _alone(self.values)
+        if not self.signs.stands_out:
+            return np.empty(0, dtype=np.intp), np.empty(0), 0.0
+        return alone(self.values)
 
     @cached_property
     def spikes(self) -> NDArray[np.intp]:
@@ -150,11 +178,6 @@ class _ExaminedChannel:
     def steps(self) -> Array:
         """From each sample to the next."""
         return np.diff(self.values)
-
-    @cached_property
-    def rests(self) -> bool:
-        """Whether any sample is that before."""
-        return not np.all(self.steps)
 
     @property
     def of_unit(self) -> str:
@@ -179,34 +202,6 @@ def _joined(starts: Array, stops: Array) -> tuple[Array, Array]:
     """Stretches, those that lie nearest to each other as one where they are many."""
     parted = np.sort(np.argsort(stops[:-1] - starts[1:], kind="stable")[: MOST_PLACES - 1])
     return starts[np.concatenate([[0], parted + 1])], stops[np.concatenate([parted, [-1]])]
-
-
-def _alone(values: Array) -> tuple[NDArray[np.intp], Array, float]:
-    away = distances(values, HALF_WIDTH)
-    if none_stands_out(away, FAR):
-        return np.empty(0, dtype=np.intp), away, 0.0
-    low, high = np.percentile(values, [1, 99])
-    beyond = away > HARMFUL * (high - low)
-    if not beyond.any():
-        return np.empty(0, dtype=np.intp), away, 0.0
-    spread = spread_of(away)
-    tall = beyond & (away > FAR * spread)
-    if not tall.any():
-        return np.empty(0, dtype=np.intp), away, spread
-    # The largest of the neighbours, without the few samples that a spike may last.
-    around = _largest_near(np.where(tall, 0.0, away), NEIGHBOURS)
-    crowd = np.convolve(tall, np.ones(2 * (NEIGHBOURS + HALF_WIDTH) + 1), mode="same")
-    alone = tall & (away > FAR_FROM_NEIGHBOURS * around) & (crowd <= HALF_WIDTH)
-    return np.flatnonzero(alone), away, spread
-
-
-def _largest_near(values: Array, half: int) -> Array:
-    """Largest of each sample and `half` neighbours on either side: spans doubled, two joined."""
-    largest, width, whole = np.pad(values, half, mode="edge"), 1, 2 * half + 1
-    while 2 * width <= whole:
-        largest, width = np.maximum(largest[:-width], largest[width:]), 2 * width
-    n, rest = len(values), whole - width
-    return np.maximum(largest[:n], largest[rest : rest + n])
 
 
 def _input_spikes(channel: _ExaminedChannel) -> SampleFault | None:
@@ -283,8 +278,10 @@ def _wraps(channel: _ExaminedChannel) -> SampleFault | None:
     if not is_convertible(channel.unit, "rad"):
         return None
     turn = TURN / si_base(channel.unit)[0]
+    if channel.signs.largest_step < (1.0 - 2.0 * NEAR_TURN) * turn:
+        return None
     steps = channel.steps
-    at = np.flatnonzero(np.abs(np.abs(steps) - turn) < 0.05 * turn)
+    at = np.flatnonzero(np.abs(np.abs(steps) - turn) < NEAR_TURN * turn)
     alone, _, _ = channel.alone
     # A lone sample that is off by a turn is a spike; both of its steps are.
     at = at[~np.isin(at, alone) & ~np.isin(at + 1, alone)]
@@ -300,8 +297,6 @@ def _dead(channel: _ExaminedChannel) -> SampleFault | None:
 
     One at the beginning or the end may be rest; one at an end of the range may be a limit.
     """
-    if not channel.rests:
-        return None
     name, stamps, values = channel.name, channel.stamps, channel.values
     starts, stops = _runs(channel.steps == 0.0)
     inner = (starts > 0) & (stops < values.size - 1)
@@ -345,8 +340,6 @@ def _stops_in_motion(channel: _ExaminedChannel, starts: NDArray[np.intp], elsewh
 
 
 def _held(channel: _ExaminedChannel) -> SampleFault | None:
-    if not channel.rests:
-        return None
     name, values = channel.name, channel.values
     rows = measured_rows(values)
     # Of a channel without a role nobody knows whether it commands: one that steps far does.
@@ -368,8 +361,6 @@ def _held(channel: _ExaminedChannel) -> SampleFault | None:
 
 def _clipped(channel: _ExaminedChannel) -> SampleFault | None:
     """Flat tops at the very extremes, met and left abruptly, again and again."""
-    if not channel.rests:
-        return None
     name, values = channel.name, channel.values
     for end in (float(values.max()), float(values.min())):
         starts, stops = _runs(values == end)

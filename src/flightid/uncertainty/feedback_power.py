@@ -16,6 +16,7 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
+from flightid import _native
 from flightid.frozen import dataclass
 from flightid.uncertainty.feedback_result import LAGS, LEVEL
 
@@ -140,18 +141,13 @@ def _whitened_power(past: Array, fed: Array) -> Array:
 def _answers(echo: Array, covariance: Array) -> Array:
     """Outputs after independent unit noise, the sample of the noise apart: (lag, output, noise)."""
     value, vector = np.linalg.eigh(covariance)
-    order, n_out, _ = echo.shape
-    weights = echo.transpose(1, 0, 2).reshape(n_out, -1)
-    # From the last to the first: what is past lies side by side, latest first.
-    back = np.zeros((ECHO, n_out, n_out))
-    back[-1] = vector * np.sqrt(np.maximum(value, 0.0))
-    largest = GROWN * float(np.max(np.abs(back[-1])))
-    for now in range(1, ECHO):
-        past = n_out * min(now, order)
-        answer = weights[:, :past] @ back[ECHO - now :].reshape(-1, n_out)[:past]
-        np.clip(answer, -largest, largest, out=back[ECHO - 1 - now])
-    back[-1] = 0.0
-    return back[::-1]
+    n_out = echo.shape[1]
+    weights = np.ascontiguousarray(echo.transpose(1, 0, 2).reshape(n_out, -1))
+    start = vector * np.sqrt(np.maximum(value, 0.0))
+    largest = GROWN * float(np.max(np.abs(start)))
+    found = _native.noise_answers(weights, start, ECHO, largest)
+    found[0] = 0.0
+    return found
 
 
 @lru_cache(maxsize=16)

@@ -11,6 +11,7 @@ pub mod linear_outputs;
 pub mod linear_recursion;
 pub mod linear_response;
 pub mod linear_simulation;
+pub mod noise_answers;
 pub mod slope_products;
 pub mod slope_recursion;
 pub mod smooth_input;

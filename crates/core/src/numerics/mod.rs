@@ -19,6 +19,7 @@ pub mod rank_bounds;
 pub mod ranks;
 pub mod recursive_filter;
 pub mod running_median;
+pub mod sample_signs;
 pub mod slow_drift;
 pub mod span_hashes;
 pub mod sparse_lu;

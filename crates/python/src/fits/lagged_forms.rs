@@ -1,7 +1,9 @@
-//! Face of `flightid_core::numerics::lagged_forms` and `lagged_rows`.
-//! (Python side: uncertainty/fitted_directions.py, uncertainty/lagged_products.py)
+//! Face of `flightid_core::numerics::lagged_forms` and `lagged_rows`, and of
+//! `flightid_core::linear::noise_answers`. (Python side: uncertainty/fitted_directions.py,
+//! uncertainty/lagged_products.py, uncertainty/feedback_power.py)
 
 use flightid_core::CoreError;
+use flightid_core::linear::noise_answers::noise_answers as answers;
 use flightid_core::numerics::lagged_forms::lagged_sums as summed;
 use flightid_core::numerics::lagged_rows;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
@@ -75,12 +77,36 @@ fn left_of_neighbours<'py>(
     left.into_pyarray(py).reshape([p, n])
 }
 
+/// noise_answers(weights: NDArray[np.float64], start: NDArray[np.float64], count: int, largest: float) -> NDArray[np.float64]
+///
+/// Outputs that past outputs alone move on, (count, n, n) by sample, output and noise: `weights`
+/// (n, order n) are by lag from one on, then past output, `start` (n, n) is the first sample. What passes
+/// `largest` stops there.
+#[pyfunction]
+fn noise_answers<'py>(
+    py: Python<'py>,
+    weights: RowMajor2<'_, f64>,
+    start: RowMajor2<'_, f64>,
+    count: usize,
+    largest: f64,
+) -> PyResult<Bound<'py, PyArray3<f64>>> {
+    let ((n, width), square) = (weights.as_array().dim(), start.as_array().dim());
+    if square != (n, n) || n == 0 || width % n != 0 {
+        let (found, needed) = (square.0 * square.1, n * n);
+        return Err(from_core(CoreError::Shape { what: "outputs of a start", found, needed }));
+    }
+    let (weights, start) = (weights.as_slice()?, start.as_slice()?);
+    let found = py.detach(|| answers(weights, start, n, count, largest));
+    found.into_pyarray(py).reshape([count, n, n])
+}
+
 /// Add this file's names to the module.
 ///
 /// # Errors
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(lagged_sums, module)?)?;
+    module.add_function(wrap_pyfunction!(noise_answers, module)?)?;
     module.add_function(wrap_pyfunction!(left_of_neighbours, module)?)?;
     module.add_function(wrap_pyfunction!(products_at_lags, module)?)
 }

@@ -7,6 +7,7 @@ use flightid_core::language::lookup_table::{
     Interpolation, LookupTable as CoreTable, Outside, cubic_spline as spline,
 };
 use flightid_core::numerics::running_median::running_median as medians;
+use flightid_core::numerics::sample_signs::SampleSigns;
 use flightid_core::numerics::span_hashes::span_hashes as hashes;
 use flightid_core::numerics::windowed_sinc::windowed_sinc as sinc;
 use numpy::{IntoPyArray, PyArray1};
@@ -126,6 +127,23 @@ fn running_median<'py>(
     Ok(py.detach(|| medians(values, half)).into_pyarray(py))
 }
 
+/// sample_signs(stamps: NDArray[np.float64], values: NDArray[np.float64], half: int, times: float) -> tuple[bool, float, bool, float, bool]
+///
+/// Whether all samples and stamps are finite; range; whether any sample is that before; largest step;
+/// whether any may be `times` the median distance from the median of `half` neighbours on either side.
+#[pyfunction]
+fn sample_signs(
+    py: Python<'_>,
+    stamps: RowMajor1<'_, f64>,
+    values: RowMajor1<'_, f64>,
+    half: usize,
+    times: f64,
+) -> PyResult<(bool, f64, bool, f64, bool)> {
+    let (stamps, values) = (stamps.as_slice()?, values.as_slice()?);
+    let found = py.detach(|| SampleSigns::of(stamps, values, half, times));
+    Ok((found.is_finite, found.range, found.rests, found.largest_step, found.stands_out))
+}
+
 /// span_hashes(samples: NDArray[np.float64], span: int) -> NDArray[np.uint64]
 ///
 /// Hashes of all spans of `span` samples (a power of two) that move.
@@ -147,6 +165,7 @@ pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_function(wrap_pyfunction!(cubic_spline, module)?)?;
     module.add_function(wrap_pyfunction!(windowed_sinc, module)?)?;
     module.add_function(wrap_pyfunction!(running_median, module)?)?;
+    module.add_function(wrap_pyfunction!(sample_signs, module)?)?;
     module.add_function(wrap_pyfunction!(span_hashes, module)?)?;
     module.add_class::<LookupTable>()
 }
