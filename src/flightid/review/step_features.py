@@ -193,15 +193,12 @@ def _crossings(curves: Array, at: Array, value: float) -> Array:
     """Where each curve first reaches a value, by straight lines; NaN where it does not."""
     above = curves >= value
     index = np.argmax(above, axis=1)
-    found = np.full(len(curves), np.nan)
-    for row in np.flatnonzero(above.any(axis=1)):
-        k = index[row]
-        if k == 0:
-            found[row] = at[0]
-            continue
-        left, right = curves[row, k - 1], curves[row, k]
-        found[row] = at[k - 1] + (at[k] - at[k - 1]) * (value - left) / (right - left)
-    return found
+    rows, before = np.arange(len(curves)), np.maximum(index - 1, 0)
+    left, right = curves[rows, before], curves[rows, index]
+    with np.errstate(invalid="ignore", divide="ignore"):
+        way = at[before] + (at[index] - at[before]) * (value - left) / (right - left)
+    found = np.where(index == 0, at[0], way)
+    return np.where(above.any(axis=1), found, np.nan)
 
 
 def _settling(shares: Array, time_s: Array) -> Array:

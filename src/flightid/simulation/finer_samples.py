@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numpy as np
 import scipy
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 DEGREE = 5
+LONG = 20_000
+"""Samples up to which splines are kept: they know nothing but the number of samples, and take
+six numbers a step."""
 
 
 def finer_samples(values: Array, times: int) -> Array:
@@ -35,15 +40,11 @@ def finer_samples(values: Array, times: int) -> Array:
     [0.0, 0.25, 1.0, 2.25, 4.0, 6.25, 9.0]
     """
     n = values.shape[1]
-    fine = np.arange(times * (n - 1) + 1) / times
     if n <= DEGREE:
-        return _by_polynomial(values, fine)
-    inner = np.arange(DEGREE // 2 + 1, n - DEGREE // 2 - 1, dtype=np.float64)
-    ends = np.ones(DEGREE + 1)
-    knots = np.concatenate([0.0 * ends, inner, (n - 1.0) * ends])
-    weights = _weights(values, knots)
-    first, parts = _splines(fine, knots)
-    found = np.zeros((len(values), len(fine)))
+        return _by_polynomial(values, np.arange(times * (n - 1) + 1) / times)
+    weights = _weights(values)
+    first, parts = (_kept if n <= LONG else _of_samples)(n, times)
+    found = np.zeros((len(values), times * (n - 1) + 1))
     for place, part in enumerate(parts):
         found += weights[:, first + place] * part
     return found
@@ -56,10 +57,10 @@ def _by_polynomial(values: Array, at: Array) -> Array:
     return np.asarray(np.linalg.solve(there, values.T).T @ here.T)
 
 
-def _weights(values: Array, knots: Array) -> Array:
+def _weights(values: Array) -> Array:
     """Weights of the B-splines that go through the samples, shape (m, n)."""
     n = values.shape[1]
-    first, parts = _splines(np.arange(n, dtype=np.float64), knots)
+    first, parts = (_kept if n <= LONG else _of_samples)(n, 1)
     band = np.zeros((2 * DEGREE + 1, n))
     for place, part in enumerate(parts):
         column = first + place
@@ -68,6 +69,18 @@ def _weights(values: Array, knots: Array) -> Array:
         (DEGREE, DEGREE), band, values.T, overwrite_ab=True, check_finite=False
     )
     return np.ascontiguousarray(solved.T)
+
+
+def _of_samples(n: int, times: int) -> tuple[NDArray[np.intp], list[Array]]:
+    """`_splines` of so many samples, at so many steps from each to the next."""
+    inner = np.arange(DEGREE // 2 + 1, n - DEGREE // 2 - 1, dtype=np.float64)
+    ends = np.ones(DEGREE + 1)
+    knots = np.concatenate([0.0 * ends, inner, (n - 1.0) * ends])
+    return _splines(np.arange(times * (n - 1) + 1) / times, knots)
+
+
+_kept = lru_cache(4)(_of_samples)
+"""Records of one campaign are of few lengths; what is kept is read alone."""
 
 
 def _splines(at: Array, knots: Array) -> tuple[NDArray[np.intp], list[Array]]:

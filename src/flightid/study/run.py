@@ -16,6 +16,7 @@ from flightid.logs import Log
 from flightid.progress import progress
 from flightid.report.html import to_html
 from flightid.report.text import to_text
+from flightid.responses.windows.kept_bases import bases_kept
 from flightid.review import FlightReview, review_flight
 from flightid.study.error_list import ErrorList
 from flightid.study.faults import TUNING, Faults
@@ -135,7 +136,8 @@ def _run(
         require_pairs(tasks, rated)
     runner = StageRunner(cache)
     # Reading and cutting, three steps for each model, writing; a flight before all of it.
-    with whole_folder(final) as folder, progress(3 + 3 * len(tasks), settings.title) as advance:
+    steps = 3 + 3 * len(tasks)
+    with whole_folder(final) as folder, progress(steps, settings.title) as advance, bases_kept():
         taken = take(settings, tasks, None if log is None else Path(log), folder, runner)
         advance(2)
         staged = identify_models(

@@ -18,9 +18,10 @@ from flightid.responses.estimators.instrument import condition_on_excitation, ex
 from flightid.responses.response import FrequencyResponse
 from flightid.responses.spectra import Spectra, average_spectra
 from flightid.responses.windows.halving import Halves
+from flightid.responses.windows.kept_bases import basis_of
 from flightid.responses.windows.planning import valid_windows
 from flightid.responses.windows.samples import Samples
-from flightid.responses.windows.transform import HANN_POWER, FoldedBasis, WindowPlan
+from flightid.responses.windows.transform import HANN_POWER, WindowPlan
 from flightid.responses.windows.window_weights import WindowShare, WindowWeights
 
 
@@ -54,7 +55,7 @@ def estimate_windowed(
     spectra, parts = [], []
     n_in, halves = len(samples.inputs), [Halves(rows) for rows in samples.records]
     for plan in plans:
-        basis = FoldedBasis.of(plan, omega * samples.sample_time_s, detrend)
+        basis = basis_of(plan, omega * samples.sample_time_s, detrend)
         one = average_spectra(halves, basis, samples.sample_time_s)
         spectra.append(one)
         if samples.excitations:

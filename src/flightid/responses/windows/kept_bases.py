@@ -1,14 +1,16 @@
 """Bases of windows that one piece of work asks for again and again, made once for all of it.
 
 A fit of responses that takes out what windows add asks for the bases of the same windows at the
-same frequencies at each of its searches, under each hold, and for its errors.
+same frequencies at each of its searches, under each hold, and for its errors; a study asks again
+for each axis, for errors that it shows and for its pictures. So it is with weights of windows.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Hashable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
+from typing import TypeVar, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,9 +18,11 @@ from numpy.typing import NDArray
 from flightid.responses.windows.transform import FoldedBasis, WindowPlan
 
 MOST_BYTES = 1 << 26
-"""Of bases that are kept: those of five windows at a hundred frequencies take less."""
-Key = tuple[WindowPlan, bytes, str]
-_KEPT: ContextVar[dict[Key, FoldedBasis] | None] = ContextVar("kept_bases", default=None)
+"""Of all that is kept: the bases of five windows at a hundred frequencies take less."""
+Made = TypeVar("Made")
+_KEPT: ContextVar[dict[Hashable, tuple[object, int]] | None] = ContextVar(
+    "kept_bases", default=None
+)
 
 
 @contextmanager
@@ -37,7 +41,7 @@ def bases_kept() -> Iterator[None]:
     if _KEPT.get() is not None:
         yield
         return
-    kept: dict[Key, FoldedBasis] = {}
+    kept: dict[Hashable, tuple[object, int]] = {}
     token = _KEPT.set(kept)
     try:
         yield
@@ -48,13 +52,42 @@ def bases_kept() -> Iterator[None]:
 
 def basis_of(plan: WindowPlan, omega: NDArray[np.float64], detrend: str) -> FoldedBasis:
     """Tapered sinusoids of a window at `omega`, rad per sample, increasing."""
-    kept = _KEPT.get()
-    if kept is None:
-        return FoldedBasis.of(plan, omega, detrend)
-    key = plan, omega.tobytes(), detrend
-    if key not in kept:
-        made = FoldedBasis.of(plan, omega, detrend)
-        if made.n_bytes + sum(each.n_bytes for each in kept.values()) > MOST_BYTES:
-            kept.clear()
-        kept[key] = made
-    return kept[key]
+    return kept(
+        lambda: (plan, omega.tobytes(), detrend),
+        lambda: FoldedBasis.of(plan, omega, detrend),
+        lambda made: made.n_bytes,
+    )
+
+
+def kept(
+    key: Callable[[], Hashable], make: Callable[[], Made], n_bytes: Callable[[Made], int]
+) -> Made:
+    """What `make` makes, or has made inside `bases_kept` for this key.
+
+    Parameters
+    ----------
+    key, make : callable
+        The key holds all that is made depends on.
+    n_bytes : callable
+        Memory of what is made; what would fill the whole place is not kept.
+
+    Example
+    -------
+    >>> with bases_kept():
+    ...     [kept(lambda: "key", lambda: made, lambda made: size)
+    ...      for made, size in ((1, MOST_BYTES + 1), (2, 8), (3, 8))]
+    [1, 2, 2]
+    """
+    held = _KEPT.get()
+    if held is None:
+        return make()
+    place = key()
+    if place in held:
+        return cast("Made", held[place][0])
+    made = make()
+    size = n_bytes(made)
+    if size <= MOST_BYTES:
+        if size + sum(each for _, each in held.values()) > MOST_BYTES:
+            held.clear()
+        held[place] = made, size
+    return made

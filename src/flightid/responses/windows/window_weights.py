@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from flightid.frozen import dataclass
 from flightid.responses.windows.halving import Halves
-from flightid.responses.windows.kept_bases import basis_of
+from flightid.responses.windows.kept_bases import basis_of, kept
 from flightid.responses.windows.transform import FoldedBasis, WindowPlan, transform
 
 Complex = NDArray[np.complex128]
@@ -67,13 +67,23 @@ class WindowWeights:
         self, bases: list[FoldedBasis], inputs: Places, frequencies: Places
     ) -> list[list[Complex]]:
         """As `weights_at`, with the bases at these frequencies given."""
-        return [
-            [
-                self._weights(record, share, basis, inputs, frequencies)
-                for share, basis in zip(self.shares, bases, strict=True)
+
+        def make() -> _Kept:
+            made = [
+                [
+                    self._weights(record, share, basis, inputs, frequencies)
+                    for share, basis in zip(self.shares, bases, strict=True)
+                ]
+                for record in map(Halves, self.instruments)
             ]
-            for record in map(Halves, self.instruments)
-        ]
+            return self, made
+
+        # The key is of this object, which lives as long as what is kept for it.
+        return kept(
+            lambda: ("weights", id(self), inputs.tobytes(), frequencies.tobytes()),
+            make,
+            lambda found: sum(each.nbytes for record in found[1] for each in record),
+        )[1]
 
     def _weights(
         self,
@@ -88,3 +98,7 @@ class WindowWeights:
         real, imaginary = transform(record, basis)
         projection = share.projection[frequencies][:, inputs]
         return np.asarray((projection @ (real - 1j * imaginary)).transpose(1, 0, 2))
+
+
+_Kept = tuple[WindowWeights, list[list[Complex]]]
+"""Weights with whose they are."""
