@@ -15,4 +15,5 @@ pub(crate) mod sensitivity_flow;
 pub mod sensitivity_pattern;
 pub mod shooting;
 pub(crate) mod state_covariance;
+pub(crate) mod step_map;
 pub mod trajectory;

@@ -11,9 +11,12 @@ use crate::state_space::ode_model::{Mass, OdeModel};
 use crate::tape::expression_tape::Registers;
 use crate::tape::tape_program::Lanes;
 use crate::trajectories::runge_kutta::{STAGES, expect, inverse};
-use crate::trajectories::sensitivity_columns::{ColumnSteps, Many};
+use crate::trajectories::sensitivity_columns::ColumnSteps;
 use crate::trajectories::sensitivity_flow::{Flow, Folded, Instant};
-use crate::trajectories::sensitivity_pattern::{BLOCK, Directions, GROUP, Pattern, Seeds, VECTOR};
+use crate::trajectories::sensitivity_pattern::{
+    BLOCK, Directions, GROUP, Pattern, Seeds, VECTOR, VECTORS,
+};
+use crate::trajectories::step_map::StepMap;
 use crate::trajectories::trajectory::Trajectory;
 
 /// Buffers, kept from run to run.
@@ -26,13 +29,14 @@ pub struct TrajectorySensitivity {
     output_pattern: Pattern,
     slopes: Lanes<BLOCK>,
     outputs: Lanes<BLOCK>,
-    /// Of each stage of each part of a block, then of the samples themselves.
+    /// Of each stage of the part at work of a block, then of the samples themselves.
     stages: Vec<Folded>,
     /// M⁻¹ of the stage at work, where it moves.
     masses: Vec<[f64; BLOCK]>,
     output_stage: Vec<[f64; BLOCK]>,
     scratch: Vec<f64>,
     inverse: Vec<f64>,
+    map: StepMap,
     columns: ColumnSteps,
     rows: Vec<f64>,
 }
@@ -80,22 +84,25 @@ impl TrajectorySensitivity {
                         // No step follows the record's last sample; one follows the last of a
                         // segment, up to its end.
                         if sample + 1 < setting.n_samples {
-                            for stages in self.stages.chunks_exact(STAGES.len()) {
-                                self.columns.advance(&self.flow, stages, lane, setting.step_s);
+                            for part in 0..setting.substeps {
+                                self.columns.advance(&self.flow, &self.map, (part, lane));
                             }
                         }
                     }
                 },
             );
+            self.columns.settle();
             if stride > 0 {
                 sink(start, &mut rows);
             }
             self.rows = rows;
             start = stop;
         }
-        let sound = self.columns.reached.as_flattened().as_flattened();
-        let sound = sound.iter().all(|entry| entry.is_finite());
-        if sound { Ok(()) } else { Err(CoreError::Diverged { sample: trajectory.range.end }) }
+        if self.columns.is_finite() {
+            Ok(())
+        } else {
+            Err(CoreError::Diverged { sample: trajectory.range.end })
+        }
     }
 
     /// Derivative of the state after the last step of the run by a column.
@@ -128,14 +135,13 @@ impl TrajectorySensitivity {
         let found = Seeds { ode, directions, leaf_slopes: &self.leaf_slopes };
         let rates = found.pattern(&ode.rate_entries);
         self.flow = Flow::new(trajectory, &rates, seeds, directions.count());
+        self.map = StepMap::new(&self.flow, setting.substeps);
         self.columns.begin(&self.flow, seeds);
         self.output_pattern = found.pattern(&ode.output_entries);
         ode.rate_slopes.prepare(n_moving, &setting.leaves, &mut self.slopes);
         ode.output_slopes.prepare(n_moving, &setting.leaves, &mut self.outputs);
-        // Four stages of each part of a sample interval, and one at the sample for outputs that
-        // need ẋ.
-        let n_stages = 4 * setting.substeps + 1;
-        self.stages.resize(n_stages, Folded::default());
+        // One more at the sample, for outputs that need ẋ.
+        self.stages.resize(STAGES.len() + 1, Folded::default());
         self.inverse.resize(n * n, 0.0);
         Ok(())
     }
@@ -172,6 +178,11 @@ impl TrajectorySensitivity {
                 let instant = Instant::Stage(part, stage);
                 self.stage(trajectory, (start, stop), instant, (&state, &driven), &mut slope)?;
             }
+            let (map, stages) = (&mut self.map, &self.stages[..STAGES.len()]);
+            widest(
+                #[inline(always)]
+                || map.join(part, stages, setting.step_s),
+            );
         }
         for lane in 0..BLOCK {
             let from = trajectory.state(sample(lane) * setting.substeps);
@@ -233,8 +244,8 @@ impl TrajectorySensitivity {
             program.run_late(&mut self.slopes);
         }
         let into = &mut self.stages[match instant {
-            Instant::Stage(part, stage) => STAGES.len() * part + stage,
-            Instant::Sample => STAGES.len() * trajectory.setting.substeps,
+            Instant::Stage(_, stage) => stage,
+            Instant::Sample => STAGES.len(),
         }];
         let known = (&ode.rate_entries[..], &self.slopes);
         self.flow.fold(trajectory, samples, instant, known, &self.masses, into);
@@ -283,19 +294,18 @@ impl TrajectorySensitivity {
         for (row, &register) in rows.chunks_exact_mut(stride).zip(&ode.output_registers) {
             row[0] = self.outputs[register][lane];
         }
+        if ode.outputs_need_rates {
+            // ẋ at the sample itself: S as it stands, between no stages.
+            let known = &self.stages[STAGES.len()];
+            self.columns.measured(flow, known, lane);
+        }
+        let columns = &self.columns;
         for group in 0..places.len().div_ceil(GROUP) {
-            let own = group * n..(group + 1) * n;
-            if ode.outputs_need_rates {
-                // ẋ at the sample itself: S as it stands, between no stages.
-                let known = &self.stages[STAGES.len() * trajectory.setting.substeps];
-                self.columns.measured(flow, known, lane, group);
-            }
-            let (state, slope) = (&self.columns.reached[own.clone()], &self.columns.slope[own]);
             let (mut states, mut rates) = (&pattern.by_state[..], &pattern.by_rate[..]);
             let order = &flow.order[group * GROUP..];
             for (row, values) in rows.chunks_exact_mut(stride).enumerate() {
-                let (mut sum, mut width) = (Many::default(), 0);
-                for (links, from) in [(&mut states, state), (&mut rates, slope)] {
+                let (mut sum, mut width) = ([[0.0; VECTOR]; VECTORS], 0);
+                for (links, is_rate) in [(&mut states, false), (&mut rates, true)] {
                     while let Some((link, rest)) = links.split_first() {
                         if link.row != row {
                             break;
@@ -303,7 +313,11 @@ impl TrajectorySensitivity {
                         *links = rest;
                         let factor = self.output_stage[link.entry][lane];
                         let reached = flow.widths[group * n + link.from];
-                        for (sum, from) in sum.iter_mut().zip(&from[link.from]).take(reached) {
+                        let from = match is_rate {
+                            false => columns.reached(n, link.from, group),
+                            true => columns.rate(n, link.from, group),
+                        };
+                        for (sum, from) in sum.iter_mut().zip(&from.0).take(reached) {
                             (0..VECTOR).for_each(|place| sum[place] += factor * from[place]);
                         }
                         width = width.max(reached);

@@ -1,100 +1,76 @@
 //! Derivatives of a state, column by column, taken over the steps of a trajectory. (Python side: none)
 
-use crate::trajectories::runge_kutta::{STAGES, WEIGHTS};
-use crate::trajectories::sensitivity_flow::{Flow, Folded};
-use crate::trajectories::sensitivity_pattern::{GROUP, VECTOR, VECTORS};
+use crate::trajectories::sensitivity_flow::{Drive, Flow, Folded};
+use crate::trajectories::sensitivity_pattern::{GROUP, Samples, VECTOR, VECTORS};
+use crate::trajectories::step_map::StepMap;
 
 /// Numbers of a group of columns.
-pub(crate) type Many = [[f64; VECTOR]; VECTORS];
-const NONE: Many = [[0.0; VECTOR]; VECTORS];
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct Many(pub(crate) [[f64; VECTOR]; VECTORS]);
+const NONE: Many = Many([[0.0; VECTOR]; VECTORS]);
+/// Its square is no normal number: beside the squares of any column's other samples it is nothing, and
+/// numbers that are not normal take the processor fifty times as long.
+const TINY: f64 = 1e-154;
+/// Place of what drives a row, behind S of even and of odd steps.
+const DRIVEN: usize = 2;
 
 /// Buffers, kept from run to run.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct ColumnSteps {
-    /// S by group, then state.
-    pub(crate) reached: Vec<Many>,
-    /// K of the sample at work, by group, then state.
-    pub(crate) slope: Vec<Many>,
-    /// S within a step, of every other stage; by group, for what no column reaches stays zero.
-    moved: [Vec<Many>; 2],
-    sum: Vec<Many>,
-    /// What drives the columns, by group, stage, state.
-    driven: Vec<Many>,
+    /// By group, then state: S of even and of odd steps, and what drives the row. Side by side, for
+    /// stores to one of them must not seem to hit what is read of another (addresses modulo 4096 differ).
+    rows: Vec<[Many; 3]>,
+    /// Which S is at hand.
+    now: usize,
 }
 
-/// Do something with as many vectors as a row has; a row that nothing reaches is left out.
+/// Sum a row with as many vectors as it has; one that nothing reaches is left out.
 macro_rules! by_width {
-    ($width:expr, $work:ident, $($argument:expr),+) => {
+    ($width:expr, $row:expr, $rows:expr) => {
         match $width {
             0 => {}
-            1 => $work::<1>($($argument),+),
-            2 => $work::<2>($($argument),+),
-            3 => $work::<3>($($argument),+),
-            4 => $work::<4>($($argument),+),
-            5 => $work::<5>($($argument),+),
-            6 => $work::<6>($($argument),+),
-            7 => $work::<7>($($argument),+),
-            _ => $work::<VECTORS>($($argument),+),
+            1 => $row.sum::<1>($rows),
+            2 => $row.sum::<2>($rows),
+            3 => $row.sum::<3>($rows),
+            4 => $row.sum::<4>($rows),
+            5 => $row.sum::<5>($rows),
+            6 => $row.sum::<6>($rows),
+            7 => $row.sum::<7>($rows),
+            _ => $row.sum::<VECTORS>($rows),
         }
     };
 }
 
-/// The sum of a row's links: their states, their values, and S.
+/// The sum of a row's factors: their states and values.
 #[derive(Clone, Copy)]
 struct Row<'a> {
-    driven: &'a Many,
+    place: usize,
     sources: &'a [usize],
     values: &'a [f64],
-    from: &'a [Many],
+    now: usize,
 }
 
 impl Row<'_> {
     #[inline(always)]
-    fn slope<const V: usize>(self) -> [[f64; VECTOR]; V] {
-        let mut sum: [[f64; VECTOR]; V] = std::array::from_fn(|v| self.driven[v]);
+    fn sum<const V: usize>(self, rows: &mut [[Many; 3]]) {
+        let mut sum: [[f64; VECTOR]; V] = std::array::from_fn(|v| rows[self.place][DRIVEN].0[v]);
         for (&source, &value) in self.sources.iter().zip(self.values) {
-            let from = &self.from[source];
+            let from = &rows[source][self.now].0;
             for (sum, from) in sum.iter_mut().zip(from) {
                 (0..VECTOR).for_each(|lane| sum[lane] += value * from[lane]);
             }
         }
-        sum
+        rows[self.place][1 - self.now].0[..V].copy_from_slice(&sum);
     }
 }
 
-#[inline(always)]
-fn keep<const V: usize>(row: Row<'_>, slope: &mut Many) {
-    slope[..V].copy_from_slice(&row.slope::<V>());
-}
-
-/// A stage whose end another one follows.
-#[inline(always)]
-fn pass<const V: usize>(
-    row: Row<'_>,
-    (stage, ahead): (usize, f64),
-    begun: &Many,
-    sum: &mut Many,
-    next: &mut Many,
-) {
-    let slope = row.slope::<V>();
-    for v in 0..V {
-        for lane in 0..VECTOR {
-            let before = if stage == 0 { 0.0 } else { sum[v][lane] };
-            sum[v][lane] = before + WEIGHTS[stage] * slope[v][lane];
-            next[v][lane] = begun[v][lane] + ahead * slope[v][lane];
-        }
-    }
-}
-
-/// The stage that ends a step.
-#[inline(always)]
-fn finish<const V: usize>(row: Row<'_>, sixth: f64, sum: &Many, reached: &mut Many) {
-    let slope = row.slope::<V>();
-    for v in 0..V {
-        for lane in 0..VECTOR {
-            reached[v][lane] += sixth * (sum[v][lane] + slope[v][lane]);
-        }
-    }
+/// The links of all rows, one row after the other.
+#[derive(Clone, Copy)]
+struct Links<'a> {
+    counts: &'a [usize],
+    sources: &'a [usize],
+    values: &'a [f64],
 }
 
 impl ColumnSteps {
@@ -102,125 +78,96 @@ impl ColumnSteps {
     pub(crate) fn begin(&mut self, flow: &Flow, seeds: &[f64]) {
         let n = flow.counts.len();
         let n_groups = flow.places.len().div_ceil(GROUP);
-        let resized = |buffer: &mut Vec<Many>, length: usize| {
-            buffer.clear();
-            buffer.resize(length, NONE);
-        };
-        resized(&mut self.driven, n_groups * STAGES.len() * n);
-        resized(&mut self.sum, n);
-        let [even, odd] = &mut self.moved;
-        let by_group = [&mut self.reached, &mut self.slope, even, odd];
-        by_group.into_iter().for_each(|each| resized(each, n_groups * n));
+        self.rows.clear();
+        self.rows.resize(n_groups * n, [NONE; 3]);
+        self.now = 0;
         for (state, seeds) in seeds.chunks_exact(flow.places.len().max(1)).enumerate() {
             for (&place, &seed) in flow.places.iter().zip(seeds) {
-                self.reached[place / GROUP * n + state][place % GROUP / VECTOR][place % VECTOR] =
-                    seed;
+                let row = &mut self.rows[place / GROUP * n + state][self.now];
+                row.0[place % GROUP / VECTOR][place % VECTOR] = seed;
             }
         }
+    }
+
+    /// S of a state by a group's columns.
+    #[inline(always)]
+    pub(crate) fn reached(&self, n_states: usize, state: usize, group: usize) -> &Many {
+        &self.rows[group * n_states + state][self.now]
+    }
+
+    /// ẋ of a state by a group's columns, right after `measured`.
+    #[inline(always)]
+    pub(crate) fn rate(&self, n_states: usize, state: usize, group: usize) -> &Many {
+        &self.rows[group * n_states + state][1 - self.now]
     }
 
     /// Derivative of a state by the column at a place.
     pub(crate) fn at(&self, n_states: usize, state: usize, place: usize) -> f64 {
-        self.reached[place / GROUP * n_states + state][place % GROUP / VECTOR][place % VECTOR]
+        let row = self.reached(n_states, state, place / GROUP);
+        row.0[place % GROUP / VECTOR][place % VECTOR]
     }
 
-    /// Take all columns over one step, whose stages are known for a sample of a block.
-    #[inline(always)]
-    pub(crate) fn advance(&mut self, flow: &Flow, stages: &[Folded], sample: usize, step_s: f64) {
-        let n = flow.counts.len();
-        for (stage, known) in stages.iter().enumerate() {
-            self.drive(flow, known, sample, stage);
-        }
-        for group in 0..flow.widths.len() / n.max(1) {
-            self.follow(flow, stages, sample, step_s, group);
+    /// Leave out what has died away: what the state at the beginning does to a fast lag, after minutes.
+    pub(crate) fn settle(&mut self) {
+        for row in &mut self.rows {
+            let entries = row[self.now].0.as_flattened_mut().iter_mut();
+            entries.filter(|entry| entry.abs() < TINY).for_each(|entry| *entry = 0.0);
         }
     }
 
-    /// Put what drives the columns of a stage where its rows begin their sums.
+    /// Whether all derivatives are numbers.
+    pub(crate) fn is_finite(&self) -> bool {
+        let all = |row: &[Many; 3]| row[self.now].0.as_flattened().iter().all(|v| v.is_finite());
+        self.rows.iter().all(all)
+    }
+
+    /// Put what drives the columns where their rows begin their sums.
     #[inline(always)]
-    fn drive(&mut self, flow: &Flow, known: &Folded, sample: usize, stage: usize) {
-        let (n, count) = (flow.counts.len(), flow.drives.len());
-        for (drive, &value) in flow.drives.iter().zip(&known.drives[sample * count..]) {
-            let (group, lane) = (drive.place / GROUP, drive.place % GROUP);
-            let row = &mut self.driven[(group * STAGES.len() + stage) * n + drive.row];
-            row[lane / VECTOR][lane % VECTOR] = value;
+    fn drive(&mut self, n_states: usize, drives: &[Drive], values: impl Iterator<Item = f64>) {
+        for (drive, value) in drives.iter().zip(values) {
+            let row = &mut self.rows[drive.place / GROUP * n_states + drive.row][DRIVEN];
+            row.0[drive.place % GROUP / VECTOR][drive.place % VECTOR] = value;
         }
     }
 
+    /// Take all columns over a part of the interval of a sample of a block.
     #[inline(always)]
-    fn follow(&mut self, flow: &Flow, stages: &[Folded], sample: usize, step_s: f64, group: usize) {
-        let n = flow.counts.len();
-        let own = group * n..(group + 1) * n;
-        let (begun, widths) = (&mut self.reached[own.clone()], &flow.widths[own.clone()]);
-        let [even, odd] = &mut self.moved;
-        let (even, odd) = (&mut even[own.clone()], &mut odd[own]);
-        for (stage, known) in stages.iter().enumerate() {
-            let driven = &self.driven[(group * STAGES.len() + stage) * n..][..n];
-            let (mut sources, mut values) = (&flow.sources[..], known.of(flow, sample));
-            // S moved to this stage is read, and that of the next is written, in turn.
-            let (from, next) =
-                if stage % 2 == 0 { (&*odd, &mut *even) } else { (&*even, &mut *odd) };
-            for row in 0..n {
+    pub(crate) fn advance(&mut self, flow: &Flow, map: &StepMap, (part, sample): (usize, usize)) {
+        let (values, driven) = map.at(part, sample).split_at(map.sources.len());
+        self.drive(flow.counts.len(), &map.drives, driven.iter().copied());
+        let links = Links { counts: &map.counts, sources: &map.sources, values };
+        self.multiply(flow, links);
+        self.now = 1 - self.now;
+    }
+
+    /// Find ẋ by the columns at a sample itself: between no stages.
+    #[inline(always)]
+    pub(crate) fn measured(&mut self, flow: &Flow, known: &Folded, sample: usize) {
+        let at = |lanes: &Samples| lanes.0[sample];
+        let (links, driven) = known.split_at(flow.sources.len());
+        let values: Vec<f64> = links.iter().map(at).collect();
+        // What drives a row within a step need not drive its rate.
+        self.rows.iter_mut().for_each(|row| row[DRIVEN] = NONE);
+        self.drive(flow.counts.len(), &flow.drives, driven.iter().map(at));
+        let links = Links { counts: &flow.counts, sources: &flow.sources, values: &values };
+        self.multiply(flow, links);
+    }
+
+    /// All links and what drives the rows, into the S that is not at hand.
+    #[inline(always)]
+    fn multiply(&mut self, flow: &Flow, links: Links<'_>) {
+        let n = links.counts.len();
+        let groups = self.rows.chunks_exact_mut(n.max(1)).zip(flow.widths.chunks_exact(n.max(1)));
+        for (rows, widths) in groups {
+            let Links { mut sources, mut values, .. } = links;
+            for (place, &count) in links.counts.iter().enumerate() {
                 let here;
-                (here, sources) = sources.split_at(flow.counts[row]);
+                (here, sources) = sources.split_at(count);
                 let factors;
-                (factors, values) = values.split_at(flow.counts[row]);
-                let of = |from| Row { driven: &driven[row], sources: here, values: factors, from };
-                let sum = &mut self.sum[row];
-                match STAGES.get(stage + 1) {
-                    Some(next_stage) => {
-                        let row_of = if stage == 0 { of(&*begun) } else { of(from) };
-                        let moves = (stage, next_stage.1 * step_s);
-                        by_width!(
-                            widths[row],
-                            pass,
-                            row_of,
-                            moves,
-                            &begun[row],
-                            sum,
-                            &mut next[row]
-                        );
-                    }
-                    None => {
-                        by_width!(
-                            widths[row],
-                            finish,
-                            of(from),
-                            step_s / 6.0,
-                            sum,
-                            &mut begun[row]
-                        );
-                    }
-                }
+                (factors, values) = values.split_at(count);
+                let row = Row { place, sources: here, values: factors, now: self.now };
+                by_width!(widths[place], row, rows);
             }
         }
-    }
-
-    /// ẋ by the columns of a group at a sample itself, into `slope`: between no stages.
-    #[inline(always)]
-    pub(crate) fn measured(&mut self, flow: &Flow, known: &Folded, sample: usize, group: usize) {
-        let n = flow.counts.len();
-        self.drive(flow, known, sample, 0);
-        let from = &self.reached[group * n..(group + 1) * n];
-        let driven = &self.driven[group * STAGES.len() * n..][..n];
-        let (mut sources, mut values) = (&flow.sources[..], known.of(flow, sample));
-        for (row, driven) in driven.iter().enumerate() {
-            let here;
-            (here, sources) = sources.split_at(flow.counts[row]);
-            let factors;
-            (factors, values) = values.split_at(flow.counts[row]);
-            let row_of = Row { driven, sources: here, values: factors, from };
-            let place = group * n + row;
-            by_width!(flow.widths[place], keep, row_of, &mut self.slope[place]);
-        }
-    }
-}
-
-impl Folded {
-    /// Values of all links at a sample of the block.
-    #[inline(always)]
-    fn of(&self, flow: &Flow, sample: usize) -> &[f64] {
-        let count = flow.sources.len();
-        &self.links[sample * count..][..count]
     }
 }

@@ -7,7 +7,7 @@ use crate::state_space::ode_model::Mass;
 use crate::tape::derivative_tape::Entry;
 use crate::tape::tape_program::Lanes;
 use crate::trajectories::runge_kutta::STAGES;
-use crate::trajectories::sensitivity_pattern::{BLOCK, GROUP, Pattern, VECTOR};
+use crate::trajectories::sensitivity_pattern::{BLOCK, GROUP, Pattern, Samples, VECTOR};
 use crate::trajectories::trajectory::Trajectory;
 
 /// An entry of −M⁻¹: the same in the whole run, or by its place among those of each sample.
@@ -20,7 +20,7 @@ enum Weight {
 /// What one derivative of one equation adds to a link or drive.
 #[derive(Debug, Clone, Copy)]
 struct Part {
-    /// Number of the link or drive.
+    /// Number of the link, or of the drive after all links.
     into: usize,
     /// Place among the entries.
     entry: usize,
@@ -52,16 +52,13 @@ pub(crate) struct Flow {
     pub(crate) places: Vec<usize>,
     /// Vectors of each row that are not always zero, by group of columns, then row.
     pub(crate) widths: Vec<usize>,
-    link_parts: Vec<Part>,
-    drive_parts: Vec<Part>,
+    /// Whether any column reaches a row.
+    pub(crate) is_reached: Vec<bool>,
+    parts: Vec<Part>,
 }
 
-/// Values of links and drives at a stage, sample after sample of a block.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Folded {
-    pub(crate) links: Vec<f64>,
-    pub(crate) drives: Vec<f64>,
-}
+/// Values of links, then drives, at a stage of all samples of a block.
+pub(crate) type Folded = Vec<Samples>;
 
 /// Where in a block a stage stands: a part of the samples' intervals and its stage, or the samples.
 #[derive(Debug, Clone, Copy)]
@@ -99,7 +96,7 @@ impl Flow {
         flow.arrange(drives.keys().copied(), seeds, n_columns);
         let drive = |&(row, column): &(usize, usize)| Drive { row, place: flow.places[column] };
         flow.drives = drives.keys().map(drive).collect();
-        (flow.link_parts, flow.drive_parts) = (parts(links), parts(drives));
+        flow.parts = parts(links.into_values().chain(drives.into_values()));
         flow
     }
 
@@ -139,6 +136,8 @@ impl Flow {
             }
         }
         self.order = order;
+        self.is_reached =
+            (0..n).map(|row| (0..n_groups).any(|g| self.widths[g * n + row] > 0)).collect();
     }
 
     /// Values at one stage of the samples `start..stop` from the derivatives of the residuals and,
@@ -162,16 +161,9 @@ impl Flow {
                 }
             }
         };
-        let (n_links, n_drives) = (self.sources.len(), self.drives.len());
-        for (values, width) in [(&mut into.links, n_links), (&mut into.drives, n_drives)] {
-            values.clear();
-            values.resize(BLOCK * width, 0.0);
-        }
-        for part in &self.link_parts {
-            let lines = into.links.chunks_exact_mut(n_links);
-            lines.zip(of(part)).for_each(|(line, value)| line[part.into] += value);
-        }
-        for part in &self.drive_parts {
+        into.clear();
+        into.resize(self.sources.len() + self.drives.len(), Samples([0.0; BLOCK]));
+        for part in &self.parts {
             let mut values = of(part);
             if let Some(input) = part.delayed {
                 // A delay acts through the rate of its input, everything else by itself.
@@ -187,8 +179,7 @@ impl Flow {
                     };
                 }
             }
-            let lines = into.drives.chunks_exact_mut(n_drives);
-            lines.zip(values).for_each(|(line, value)| line[part.into] += value);
+            into[part.into].0.iter_mut().zip(values).for_each(|(sum, value)| *sum += value);
         }
     }
 }
@@ -210,8 +201,7 @@ fn solved(trajectory: &Trajectory<'_>) -> Vec<(usize, usize, Weight)> {
 
 type Found = Vec<(usize, Weight, f64, Option<usize>)>;
 
-fn parts(found: BTreeMap<(usize, usize), Found>) -> Vec<Part> {
-    let numbered = found.into_values().enumerate();
+fn parts(found: impl Iterator<Item = Found>) -> Vec<Part> {
     let each = |(into, found): (usize, Found)| {
         found.into_iter().map(move |(entry, weight, factor, delayed)| Part {
             into,
@@ -221,5 +211,5 @@ fn parts(found: BTreeMap<(usize, usize), Found>) -> Vec<Part> {
             delayed,
         })
     };
-    numbered.flat_map(each).collect()
+    found.enumerate().flat_map(each).collect()
 }

@@ -5,6 +5,10 @@ use crate::tape::derivative_tape::Entry;
 
 /// Samples whose derivatives are known side by side.
 pub(crate) const BLOCK: usize = 16;
+/// A number at each sample of a block, whole lines of the cache.
+#[derive(Debug, Clone, Copy)]
+#[repr(align(64))]
+pub(crate) struct Samples(pub(crate) [f64; BLOCK]);
 /// Columns that fit a vector register.
 pub(crate) const VECTOR: usize = 4;
 /// Of them in a group.
