@@ -8,7 +8,7 @@ cost has a kink at whole samples, where noises and derivatives settle for a dela
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import TypeVar
 
@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from flightid.errors import FlightidError
 from flightid.frozen import dataclass
 from flightid.identification.multistart import End
-from flightid.models import GreyBoxModel
+from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.simulation.model_outputs import systems_of
 
 Array = NDArray[np.float64]
@@ -96,10 +96,10 @@ class DelayCells:
         high = np.min((last - JUST) * steps, axis=0) - delays
         free = model.parameters.free
         bounds = np.full((2, len(free)), [[-np.inf], [np.inf]])
-        for place, parameter in enumerate(free):
-            value = parameter.value or 0.0
+        for place in _moving_delays(model):
+            value = free[place].value or 0.0
             change = DIFFERENCE * (abs(value) or 1.0)
-            moved = self.delays(model.with_values({parameter.name: value + change}))
+            moved = self.delays(model.with_values({free[place].name: value + change}))
             slope = (moved - delays) / change
             for each in np.flatnonzero(slope):
                 ends = np.sort([low[each] / slope[each], high[each] / slope[each]])
@@ -142,14 +142,22 @@ def later_by(model: GreyBoxModel, time_s: float) -> Array:
     values = np.array([parameter.value or 0.0 for parameter in free])
     delays = _delays_of(model)
     slopes = np.zeros((len(delays), len(free)))
-    # Equations without a delay of their own have none that moves.
-    for place, parameter in enumerate(free if getattr(model, "delays", True) else ()):
+    for place in _moving_delays(model):
         change = DIFFERENCE * (abs(values[place]) or 1.0)
-        moved = _delays_of(model.with_values({parameter.name: values[place] + change}))
+        moved = _delays_of(model.with_values({free[place].name: values[place] + change}))
         slopes[:, place] = (moved - delays) / change
     moves = np.linalg.lstsq(slopes, np.full(len(delays), time_s))[0] if slopes.size else 0.0
     lower, upper = (np.array([getattr(p, end) for p in free]) for end in ("minimum", "maximum"))
     return np.asarray(np.clip(values + moves, lower, upper), dtype=np.float64)
+
+
+def _moving_delays(model: GreyBoxModel) -> Sequence[int]:
+    """Places of free parameters that may move a delay."""
+    if not isinstance(model, StateSpaceModel):
+        return range(len(model.parameters.free))
+    values, free = model.parameters.independent_values(), model.parameters.free_indices
+    late = np.asarray(model.parameters.tape(model.delays.values()).jacobian(values, free))
+    return np.flatnonzero(np.any(late.reshape(-1, len(free)) != 0.0, axis=0)).tolist()
 
 
 def _delays_of(model: GreyBoxModel) -> Array:
