@@ -66,6 +66,36 @@ class RecordBlock:
         """`basis` by output."""
         return OwnDirections(self.basis.reshape(*self.residual.shape, -1))
 
+    @cached_property
+    def power(self) -> Array:
+        """Squares of the residual, by output."""
+        return np.asarray(np.einsum("ij,ij->i", self.residual, self.residual))
+
+    @cached_property
+    def products(self) -> tuple[Array, ...]:
+        """By output, products of [own, projected, residual] in each half, (2, w, w).
+
+        Of own directions what reaches the output.
+        """
+        return tuple(self._products(*self.of_output(k), row) for k, row in enumerate(self.residual))
+
+    def _products(self, own: Array, shared: Array, residual: Array) -> Array:
+        m, width = own.shape[1], own.shape[1] + shared.shape[1] + 1
+        found = np.empty((2, width, width))
+        for each, rows in zip(found, self.halved, strict=True):
+            first, second, left = own[rows], shared[rows], residual[rows]
+            if m:
+                each[:m, :m], each[:m, m:-1] = first.T @ first, first.T @ second
+                each[:m, -1], each[m:-1, :m] = left @ first, each[:m, m:-1].T
+            each[m:-1, m:-1], each[m:-1, -1] = second.T @ second, left @ second
+            each[-1, :-1], each[-1, -1] = each[:-1, -1], left @ left
+        return found
+
+    @property
+    def halved(self) -> tuple[slice, slice]:
+        """Samples of both halves."""
+        return slice(None, self.middle), slice(self.middle, None)
+
     def of_output(self, output: int) -> tuple[Array, Array]:
         """Rows of one output, (n_samples, k) each: of `basis` what reaches it, and `projected`."""
         return self.own.columns[output], _of_output(self.projected, self, output)
@@ -92,17 +122,25 @@ class RecordBlock:
                 np.subtract(shared[here], basis[here] @ on_own, out=projected[here])
         return cls(projected, on_own, basis, triangle, residual)
 
-    def along(self, directions: Array, *, overwrite: bool = False) -> RecordBlock:
+    def along(
+        self, directions: Array, *, overwrite: bool = False, alone: bool = False
+    ) -> RecordBlock:
         """The same by combinations of the parameters, one a column.
 
         With `overwrite` in the memory of this block's sensitivities, which are then no longer its.
+        `alone` says that they are orthonormal by these: squares tell what each sample does.
         """
-        half = self.middle
+        half = None if alone and self.half is None else self.middle
         answering = None if self.answering is None else self.answering @ directions
         turned = self.projected if overwrite else np.empty_like(self.projected)
+        shares = np.zeros(len(turned) if half is None else 0)
         for begin in range(0, len(turned), AT_ONCE):
             rows = slice(begin, begin + AT_ONCE)
             turned[rows] = self.projected[rows] @ directions
+            if half is None:
+                np.einsum("ij,ij->i", turned[rows], turned[rows], out=shares[rows])
+        if half is None:
+            half = middle_of(shares.reshape(self.residual.shape).sum(axis=0))
         return replace(
             self,
             projected=turned,
@@ -157,7 +195,7 @@ def levels(blocks: Sequence[RecordBlock]) -> Array:
 
     Records of one colour need not be of one level: a harder manoeuvre may be a noisier one.
     """
-    squares = np.array([np.sum(block.residual**2, axis=1) for block in blocks])
+    squares = np.array([block.power for block in blocks])
     counts = np.array([block.residual.shape[1] for block in blocks])
     common = squares.sum(axis=0) / counts.sum()
     known = common > 0.0
@@ -186,14 +224,13 @@ def halves(block: RecordBlock, output: int) -> Array:
 
 def _squares_of_halves(block: RecordBlock, output: int) -> Array:
     """Products of `halves`, of which one is zero where the other is not."""
-    own, shared = block.of_output(output)
-    m, count, half = own.shape[1], shared.shape[1], block.middle
+    products, count = block.products[output], block.projected.shape[1]
+    m = products.shape[1] - count - 1
     found = np.zeros((m + 2 * count, m + 2 * count))
-    found[:m, :m] = own.T @ own
-    for first, rows in ((m, slice(None, half)), (m + count, slice(half, None))):
+    found[:m, :m] = products[:, :m, :m].sum(axis=0)
+    for first, part in zip((m, m + count), products, strict=True):
         span = slice(first, first + count)
-        found[span, span] = shared[rows].T @ shared[rows]
-        found[:m, span] = own[rows].T @ shared[rows]
+        found[span, span], found[:m, span] = part[m:-1, m:-1], part[:m, m:-1]
         found[span, :m] = found[:m, span].T
     return found
 
@@ -264,7 +301,12 @@ def directions_taken(blocks: Sequence[RecordBlock]) -> list[FittedDirections]:
         ends = np.cumsum([len(each) for each in apart])[:-1]
         shared = np.split(np.linalg.qr(np.vstack(apart))[0], ends)
     return [
-        FittedDirections(block.own.whole, each.reshape(*block.residual.shape, -1), block.own)
+        FittedDirections(
+            block.own.whole,
+            each.reshape(*block.residual.shape, -1),
+            block.own,
+            None if answering else [np.asarray(part.sum(axis=0)) for part in block.products],
+        )
         for block, each in zip(blocks, shared, strict=True)
     ]
 
@@ -281,16 +323,19 @@ def joined(apart: Array, block: RecordBlock) -> Array:
 def _flight(answers: Array, block: RecordBlock) -> RecordParts:
     """Scores of both halves, their information, and their noise with the own numbers taken out."""
     count = block.projected.shape[1]
-    answering = block.projected if block.answering is None else block.answering
     scores, square = np.zeros((2, count)), np.zeros((2, count, count))
     on_own = np.zeros((block.basis.shape[1], 2, count))
-    for output, residual in enumerate(block.residual):
-        (own, shared), answer = block.of_output(output), _of_output(answering, block, output)
-        for place, rows in enumerate((slice(None, block.middle), slice(block.middle, None))):
-            # A half meets what answers there alone.
-            scores[place] += residual[rows] @ shared[rows]
-            square[place] += shared[rows].T @ answer[rows]
-            on_own[block.own.places[output], place] += own[rows].T @ shared[rows]
+    for output, products in enumerate(block.products):
+        m = products.shape[1] - count - 1
+        scores += products[:, m:-1, -1]
+        on_own[block.own.places[output]] += products[:, :m, m:-1].swapaxes(0, 1)
+        if block.answering is None:
+            square += products[:, m:-1, m:-1]
+            continue
+        parts = (_of_output(each, block, output) for each in (block.projected, block.answering))
+        shared, answer = parts
+        # A half meets what answers there alone.
+        square += [shared[rows].T @ answer[rows] for rows in block.halved]
     turn = np.vstack([-on_own.reshape(len(on_own), 2 * count), np.eye(2 * count)])
     return RecordParts(scores, square, (turn.T @ answers @ turn).reshape(2, count, 2, count))
 

@@ -179,7 +179,8 @@ def residual_covariance(
         triangle = triangle_of(blocks, None if beside is None else beside.slopes)
     root = _inverse_root(triangle)
     # In directions of unit information squares keep their digits, however nearly singular it is.
-    whitened = [block.along(root, overwrite=overwrite) for block in blocks]
+    alone = len(blocks) == 1 and beside is None
+    whitened = [block.along(root, overwrite=overwrite, alone=alone) for block in blocks]
     slopes = None if beside is None else beside.along(root)
     inner = _gain(slopes, whitened)
     half = root @ inner

@@ -141,9 +141,7 @@ class FitResponse:
                 own = [u.T @ u for u in sharp]
                 score = self._of_output(output, met, own, sharp)
                 scale = np.diag(np.asarray(sum(own)))
-            power = sum(
-                float(block.residual[output] @ block.residual[output]) for block in self.blocks
-            )
+            power = sum(float(block.power[output]) for block in self.blocks)
             for place, j in enumerate(moving):
                 span = slice(place * lags.size, (place + 1) * lags.size)
                 chance = chance_of_lags(score[0][span], score[1][span, span], scale[span])

@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import cached_property, lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flightid import _native
 from flightid.frozen import dataclass
 from flightid.uncertainty.own_directions import OwnDirections
 
 Array = NDArray[np.float64]
 TURN, TERMS = 0.5, 12
 """Largest phase (rad) over half of a span of samples, and terms of its series: 5e-13 is left."""
-AT_ONCE = 8192
-"""Rows that are turned together: they stay in the cache."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,47 +28,31 @@ class FittedDirections:
         Of parameters; orthonormal over all records together.
     known : OwnDirections, optional
         What is known of `own` already.
+    products : sequence of ndarray, shape (w, w), optional
+        By output, products of [own directions that reach it, shared ones, residual].
     """
 
     own: Array
     shared: Array
     known: OwnDirections | None = None
+    products: Sequence[Array] | None = None
 
     @cached_property
     def reaching(self) -> OwnDirections:
         """Of each output, the own directions that reach it."""
         return OwnDirections(self.own) if self.known is None else self.known
 
+    def squares(self, output: int) -> Array:
+        """Products of the directions that reach an output."""
+        if self.products is not None:
+            return self.products[output][:-1, :-1]
+        own, shared = self.reaching.columns[output], self.shared[output]
+        beside = own.T @ shared
+        return np.block([[own.T @ own, beside], [beside.T, shared.T @ shared]])
+
     def places(self, output: int) -> NDArray[np.intp]:
         """Which of all directions, the own ones first, reach an output."""
         return self.reaching.within(output, self.shared.shape[2])
-
-
-def lags_of_form(columns: Array, form: Array, n_lags: int) -> Array:
-    """Sums over a record of q(t)ᵀ M q(t + k), for lags k from zero on.
-
-    Parameters
-    ----------
-    columns : ndarray, shape (n, m)
-        Rows q(t).
-    form : ndarray, shape (m, m)
-        M, symmetric.
-    n_lags : int
-
-    Returns
-    -------
-    ndarray, shape (n_lags,)
-
-    Example
-    -------
-    >>> lags_of_form(np.array([[1.0], [2.0], [3.0]]), np.eye(1), 2)
-    array([14.,  8.])
-    """
-    found = np.zeros(n_lags)
-    for begin in range(0, len(columns), AT_ONCE):
-        turned = columns[begin : begin + AT_ONCE] @ form
-        found += _native.lagged_sums(turned, columns[begin:][: AT_ONCE + n_lags], n_lags)
-    return found
 
 
 def slow_transforms(columns: Array, length: int, n_bins: int) -> NDArray[np.complex128]:

@@ -67,10 +67,10 @@ class LaggedInputs:
         """XᵀU for each of some columns X (n, k)."""
         if self.formed:
             return [np.asarray(columns.T @ self.columns) for columns in parts]
-        totals = self._totals
+        n = self.centred.shape[1]
         return [
-            found - np.outer(columns.mean(axis=0), totals)
-            for columns, found in zip(parts, self._with_lags(parts), strict=True)
+            found[:, :-1] - np.outer(found[:, -1] / n, self._totals)
+            for found in self._with_lags(parts)
         ]
 
     @cached_property
@@ -85,10 +85,14 @@ class LaggedInputs:
         return np.concatenate([np.zeros((len(self.centred), self.n_lags - 1)), self.centred], 1)
 
     def _with_lags(self, parts: Sequence[Array]) -> list[Array]:
+        """Products of columns with inputs at their lags and, last, with a constant one."""
         count, n = self.centred.shape
-        found = [np.zeros((self.n_lags * count, columns.shape[1])) for columns in parts]
-        for piece, lags in at_lags(self._padded, n, self.n_lags - 1):
+        found = [np.zeros((self.n_lags * count + 1, columns.shape[1])) for columns in parts]
+        for piece, lags in at_lags(self._padded, n, self.n_lags - 1, beside=1.0):
             for each, columns in zip(found, parts, strict=True):
                 np.add(each, lags @ columns[piece], out=each)
-        by_lag = [each.reshape(self.n_lags, count, -1).transpose(2, 1, 0) for each in found]
-        return [each.reshape(len(each), -1) for each in by_lag]
+        by_lag = [each[:-1].reshape(self.n_lags, count, -1).transpose(2, 1, 0) for each in found]
+        return [
+            np.concatenate([lags.reshape(len(lags), -1), each[-1:].T], axis=1)
+            for lags, each in zip(by_lag, found, strict=True)
+        ]

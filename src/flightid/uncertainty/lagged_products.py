@@ -153,7 +153,9 @@ def products_with_past(news: Sequence[Array], records: Sequence[Array], longest:
     return found
 
 
-def at_lags(rows: Array, count: int, longest: int) -> Iterator[tuple[slice, Array]]:
+def at_lags(
+    rows: Array, count: int, longest: int, beside: float | None = None
+) -> Iterator[tuple[slice, Array]]:
     """The last samples of rows at all lags, piece by piece of samples.
 
     Parameters
@@ -163,6 +165,8 @@ def at_lags(rows: Array, count: int, longest: int) -> Iterator[tuple[slice, Arra
         Of the samples.
     longest : int
         Longest lag.
+    beside : float, optional
+        A constant in one more row, the last.
 
     Yields
     ------
@@ -177,10 +181,12 @@ def at_lags(rows: Array, count: int, longest: int) -> Iterator[tuple[slice, Arra
     array([[2., 3.],
            [1., 2.]])
     """
+    constant = [] if beside is None else [np.full((1, AT_ONCE), beside)]
     for begin in range(0, count, AT_ONCE):
         part = slice(begin, min(begin + AT_ONCE, count))
         first, last = (rows.shape[1] - count + each for each in (part.start, part.stop))
-        yield part, np.concatenate([rows[:, first - k : last - k] for k in range(longest + 1)])
+        lags = [rows[:, first - k : last - k] for k in range(longest + 1)]
+        yield part, np.concatenate([*lags, *(each[:, : last - first] for each in constant)])
 
 
 def past(rows: Array, first: int, lags: range) -> Array:

@@ -126,11 +126,15 @@ def half_cycles(
     n = residual.shape[1]
     high, levels = np.zeros((n_outputs, width, width)), np.zeros((n_outputs, n_bins))
     for o, model in enumerate(fast):
-        columns = np.hstack([taken.reaching.columns[o], taken.shared[o], residual[o][:, None]])
         places = taken.reaching.within(o, taken.shared.shape[2], 1)
+        known = None if taken.products is None else taken.products[o]
+        if not model.is_white or known is None:
+            parts = taken.reaching.columns[o], taken.shared[o], residual[o][:, None]
+            columns = np.hstack(parts)
         if model.is_white:
             levels[o] = model.lags[0]
-            whole = spread(columns.T @ columns / size[o] ** 2, places, width)
+            products = columns.T @ columns if known is None else known
+            whole = spread(products / size[o] ** 2, places, width)
             high[o] = (whole - low[o].T @ low[o]) / model.lags[0]
             continue
         turned = scipy.fft.dct(columns, axis=0, norm="ortho", overwrite_x=True) / size[o]

@@ -15,15 +15,14 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from flightid.uncertainty.fitted_directions import FittedDirections, lags_of_form, slow_transforms
+from flightid._native import lags_of_form
+from flightid.uncertainty.fitted_directions import FittedDirections, slow_transforms
 from flightid.uncertainty.own_directions import spread
 from flightid.uncertainty.periodograms import twice
 from flightid.uncertainty.transformed_columns import of_both, powers_of, squares_of, transforms
 
 Array = NDArray[np.float64]
 T = TypeVar("T", bound=np.generic)
-AT_ONCE = 4096
-"""Samples whose directions stand side by side: all of them would take what slopes take."""
 Known = dict[tuple[int, int], NDArray[T]]
 """By record and output."""
 
@@ -101,7 +100,7 @@ class TakenNoise:
             form = 2.0 * level * np.eye(len(each)) - each
             form = self._reaching(form, k, output)
             slow = _kept(self._slow, (k, output), self._slowest)
-            lags += self._lags(k, output, form)
+            lags += lags_of_form(*self._apart(k, output), form, self._n_lags)
             power += np.sum((slow @ form) * slow.conj(), axis=1).real
         return lags, power
 
@@ -140,41 +139,26 @@ class TakenNoise:
     def _transform(self, record: int, output: int) -> Array:
         return transforms(self._together(record, output), self._length)
 
-    def _lags(self, record: int, output: int, form: Array) -> Array:
-        """`lags_of_form` of all directions, side by side some samples at a time."""
-        found, n = np.zeros(self._n_lags), self._taken[record].shared.shape[1]
-        for first in range(0, n, AT_ONCE):
-            # Later samples are met by those of this span, and by each other in the next.
-            met = slice(first, min(first + AT_ONCE + self._n_lags - 1, n))
-            part = self._together(record, output, met)
-            found += lags_of_form(part, form, self._n_lags)
-            if len(part) > AT_ONCE:
-                found -= lags_of_form(part[AT_ONCE:], form, self._n_lags)
-        return found
-
     def _slowest(self, record: int, output: int) -> NDArray[np.complex128]:
         parts = [
             slow_transforms(each, self._length, self._n_bins)
             for each in self._apart(record, output)
+            if each.shape[1]
         ]
         return np.concatenate(parts, axis=1)
 
     def _squared(self, record: int, output: int) -> Array:
-        own, shared = self._apart(record, output)
-        beside = own.T @ shared
-        return np.block([[own.T @ own, beside], [beside.T, shared.T @ shared]])
+        return self._taken[record].squares(output)
 
     def _apart(self, record: int, output: int) -> tuple[Array, Array]:
         """Own and shared directions that reach an output, (n, n_own) and (n, n_shared)."""
         taken = self._taken[record]
         return taken.reaching.columns[output], taken.shared[output]
 
-    def _together(self, record: int, output: int, samples: slice = slice(None)) -> Array:
+    def _together(self, record: int, output: int) -> Array:
         """Own and shared directions that reach an output side by side."""
         own, shared = self._apart(record, output)
-        if not own.shape[1]:
-            return shared[samples]
-        return np.asarray(np.concatenate([own[samples], shared[samples]], axis=1))
+        return np.asarray(np.concatenate([own, shared], axis=1)) if own.shape[1] else shared
 
 
 def _kept(

@@ -56,7 +56,8 @@ class Innovations:
     @classmethod
     def of(cls, noise: Autoregression, block: RecordBlock, output: int) -> Innovations:
         """Whitened by a model of the noise."""
-        errors, free = _errors(noise, block, output)
+        free = _free(*block.of_output(output))
+        errors = _innovations(noise, block.residual[output]) / np.sqrt(free)
         return cls(_heard(noise, halves(block, output)), errors, free)
 
     def excess(self, level: float) -> Array:
@@ -88,7 +89,7 @@ class Ranks:
 
         None where samples are few.
         """
-        errors, free = _errors(noise, block, output)
+        free = _free(*block.of_output(output))
         kept = np.flatnonzero(free > FREE)
         if kept.size > MOST:
             first = (kept.size - MOST) // 2
@@ -97,8 +98,10 @@ class Ranks:
             return None
         heard = _heard(noise, block.of_output(output)[1])
         size = np.einsum("ij,jk,ik->i", half, heard.T @ heard / len(heard), half)
+        errors = _innovations(noise, block.residual[output])
         if kept.size < len(errors):
-            errors, heard = errors[kept], heard[kept]
+            errors, heard, free = errors[kept], heard[kept], free[kept]
+        errors = errors / np.sqrt(free)
         signals = np.empty((len(half) + 1, len(errors)))
         each = signals[:-1]
         np.matmul(half, heard.T, out=each)
@@ -176,15 +179,20 @@ def _whitener(noise: Autoregression) -> Array:
     return np.asarray(scipy.linalg.solve_toeplitz(lags[:-1], lags[1:]))
 
 
-def _errors(noise: Autoregression, block: RecordBlock, output: int) -> tuple[Array, Array]:
-    """Innovations over the root of the share that the fit left of each, and that share."""
-    own, shared = block.of_output(output)
-    taken = np.einsum("ij,ij->i", own, own) + np.einsum("ij,ij->i", shared, shared)
-    free = np.clip(1.0 - taken, FREE, 1.0)
-    errors, weights = block.residual[output], _whitener(noise)
-    if weights.size:
-        errors = filtered(np.concatenate(([1.0], -weights)), [1.0], errors)
-    return errors / np.sqrt(free), free
+def _free(own: Array, shared: Array) -> Array:
+    """Share of each innovation that the fit left."""
+    taken = np.einsum("ij,ij->i", shared, shared)
+    if own.shape[1]:
+        taken += np.einsum("ij,ij->i", own, own)
+    return np.asarray(np.clip(1.0 - taken, FREE, 1.0))
+
+
+def _innovations(noise: Autoregression, residual: Array) -> Array:
+    """What the past does not foretell of a residual."""
+    weights = _whitener(noise)
+    if not weights.size:
+        return residual
+    return filtered(np.concatenate(([1.0], -weights)), [1.0], residual)
 
 
 def _heard(noise: Autoregression, columns: Array) -> Array:

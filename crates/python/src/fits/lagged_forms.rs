@@ -4,7 +4,7 @@
 
 use flightid_core::CoreError;
 use flightid_core::linear::noise_answers::noise_answers as answers;
-use flightid_core::numerics::lagged_forms::lagged_sums as summed;
+use flightid_core::numerics::lagged_forms::lags_of_form as summed;
 use flightid_core::numerics::lagged_rows;
 use numpy::{IntoPyArray, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use pyo3::prelude::*;
@@ -12,24 +12,23 @@ use pyo3::prelude::*;
 use crate::error::from_core;
 use crate::row_major::RowMajor2;
 
-/// lagged_sums(earlier: NDArray[np.float64], later: NDArray[np.float64], n_lags: int) -> NDArray[np.float64]
+/// lags_of_form(own: NDArray[np.float64], shared: NDArray[np.float64], form: NDArray[np.float64], n_lags: int) -> NDArray[np.float64]
 ///
-/// Sums over a record of p(t)ᵀ q(t + k) for rows p of `earlier` (n, m), q of `later` (n, m) and lags k
-/// from zero on.
+/// Sums over a record of q(t)ᵀ M q(t + k) for lags k from zero on, where rows q are those of `own` (n, a)
+/// and `shared` (n, b) side by side, and M is `form` (a + b, a + b), symmetric.
 #[pyfunction]
-fn lagged_sums<'py>(
+fn lags_of_form<'py>(
     py: Python<'py>,
-    earlier: RowMajor2<'_, f64>,
-    later: RowMajor2<'_, f64>,
+    own: RowMajor2<'_, f64>,
+    shared: RowMajor2<'_, f64>,
+    form: RowMajor2<'_, f64>,
     n_lags: usize,
 ) -> PyResult<Bound<'py, PyArray1<f64>>> {
-    let width = earlier.as_array().ncols();
-    let (found, needed) = (later.as_array().ncols(), width);
-    if found != needed {
-        return Err(from_core(CoreError::Shape { what: "numbers of a row", found, needed }));
-    }
-    let (earlier, later) = (earlier.as_slice()?, later.as_slice()?);
-    Ok(py.detach(|| summed(earlier, later, width, n_lags)).into_pyarray(py))
+    let widths = (own.as_array().ncols(), shared.as_array().ncols());
+    let parts = [(own.as_slice()?, widths.0), (shared.as_slice()?, widths.1)];
+    let form = form.as_slice()?;
+    let found = py.detach(|| summed(parts, form, n_lags)).map_err(from_core)?;
+    Ok(found.into_pyarray(py))
 }
 
 /// products_at_lags(now: NDArray[np.float64], past: NDArray[np.float64]) -> NDArray[np.float64]
@@ -105,7 +104,7 @@ fn noise_answers<'py>(
 /// # Errors
 /// Never in practice; PyO3's own.
 pub fn register(module: &Bound<'_, PyModule>) -> PyResult<()> {
-    module.add_function(wrap_pyfunction!(lagged_sums, module)?)?;
+    module.add_function(wrap_pyfunction!(lags_of_form, module)?)?;
     module.add_function(wrap_pyfunction!(noise_answers, module)?)?;
     module.add_function(wrap_pyfunction!(left_of_neighbours, module)?)?;
     module.add_function(wrap_pyfunction!(products_at_lags, module)?)
