@@ -137,10 +137,20 @@ class WindowedWeights:
 
 
 def _moving(rows: Real) -> Places:
-    """Rows that are not zero throughout."""
+    """Rows that are not zero throughout.
+
+    Example
+    -------
+    >>> _moving(np.array([[0.0, 0.0], [0.0, 1.0], [1.0, 0.0], [0.0, 0.0]])).tolist()
+    [1, 2]
+    """
     found = np.any(rows[:, ::SAMPLED], axis=1)  # of most rows that tells already
-    for still in np.flatnonzero(~found):
-        found[still] = np.any(rows[still])
+    still = np.flatnonzero(~found)
+    # Coefficients that do not act in a record stand side by side: one look at all of them.
+    for block in np.split(still, np.flatnonzero(np.diff(still) > 1) + 1):
+        some = rows[block[0] : block[-1] + 1] if block.size else rows[:0]
+        if np.any(some):
+            found[block] = np.any(some, axis=1)
     return np.flatnonzero(found)
 
 
