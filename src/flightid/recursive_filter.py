@@ -32,7 +32,7 @@ def filtered(b: ArrayLike, a: ArrayLike, x: ArrayLike, axis: int = -1) -> Array:
     Reference
     ---------
     Oppenheim & Schafer, *Discrete-Time Signal Processing*, 3rd ed., §6.3.4: transposed direct form
-    II, sums and products in the order of ``scipy.signal.lfilter``.
+    II, with poles sums and products in the order of ``scipy.signal.lfilter``.
 
     Example
     -------
@@ -107,6 +107,12 @@ def _of_one_length(above: Array, below: Array) -> tuple[Array, Array]:
 
 def _convolved(weights: Array, signal: Array, axis: int) -> Array:
     """Without poles: sums that do not depend on one another."""
-    kept = signal.shape[axis]
-    whole = np.apply_along_axis(lambda row: np.convolve(weights, row), axis, signal)
-    return np.asarray(np.take(whole, np.arange(kept), axis=axis))
+    rows = np.moveaxis(signal, axis, -1)
+    n, before = rows.shape[-1], len(weights) - 1
+    found = np.empty(rows.shape)
+    latest_last = np.ascontiguousarray(-weights[None, ::-1])
+    none, padded = np.zeros((1, n)), np.zeros((1, before + n))
+    for place in np.ndindex(rows.shape[:-1]):
+        padded[0, before:] = rows[place]
+        found[place] = _native.left_of_neighbours(none, padded, latest_last)[0]
+    return np.moveaxis(found, -1, axis)
