@@ -12,7 +12,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Protocol
+from functools import partial
+from typing import Any, Protocol
 
 import numpy as np
 import scipy
@@ -27,6 +28,7 @@ from flightid.responses.errors.noise_kernels import (
 )
 from flightid.responses.errors.noise_levels import LevelProducts, LevelVariances
 from flightid.responses.errors.random_error import JointErrors, Points, union
+from flightid.responses.windows.kept_bases import kept
 from flightid.responses.windows.window_weights import WindowWeights
 
 COLUMNS = 128
@@ -155,8 +157,9 @@ class WindowedErrors(JointErrors):
         for n_samples in sorted(set(lengths)):
             weights = [each for each, n in zip(chosen, lengths, strict=True) if n == n_samples]
             length, bins = self._noise_bins(n_samples, frequencies)
+            asked = "kernels", n_samples, inputs.tobytes(), frequencies.tobytes()
             for columns in np.array_split(bins, -(-len(bins) // COLUMNS)):
-                yield from self._of_bins(columns, length, weights, frequencies)
+                yield from self._of_bins(columns, length, weights, frequencies, asked)
 
     def _part(self, wanted: Points, inputs: Places, frequencies: Places) -> _Part:
         turns = self.composite.sensitivity[:, :, :, wanted.output][:, :, :, wanted.inputs]
@@ -187,30 +190,39 @@ class WindowedErrors(JointErrors):
         length: int,
         records: Sequence[Sequence[Complex]],
         frequencies: Places,
+        asked: tuple[Any, ...],
     ) -> Iterator[tuple[_BinNoise, Complex, Places]]:
-        """Noise and kernels at some bins, for all records of one length."""
+        """Noise and kernels at some bins, for all records of one length; `asked` names both."""
         angle = 2.0 * np.pi * columns / length
         noise = self._noise_at(columns, length)
         omega = self.windows.omega[frequencies]
         near = np.flatnonzero(omega + self._reach() >= angle[0])
-        shares, detrend = self.windows.shares, self.windows.detrend
-        bases = [
-            kept_transforms(share.plan.length, omega[near].tobytes(), angle.tobytes(), detrend)
-            for share in shares
-        ]
-        turns = [
-            kept_turns(share.plan.length // 2, share.plan.hop, weight.shape[2], angle.tobytes())
-            for share, weight in zip(shares, records[0], strict=True)
-        ]
-        for weights in records:
-            kernels = np.empty(
-                (len(weights[0]), len(near), 2 * len(shares), len(angle)), dtype=np.complex128
+        for place, weights in enumerate(records):
+            # Errors are asked for again with another noise, of which kernels know nothing. The key
+            # is of the windows, which live as long as what is kept for them.
+            _, kernels = kept(
+                partial(tuple, (*asked, id(self.windows), int(columns[0]), place)),
+                partial(self._kernel, weights, near, omega[near], angle),
+                lambda made: made[1].nbytes,
+                room="kernels",
             )
-            for place, (weight, turn, both) in enumerate(zip(weights, turns, bases, strict=True)):
-                mirrored_kernels(
-                    weight[:, near], turn, both, kernels[:, :, 2 * place : 2 * place + 2]
-                )
             yield noise, kernels, near
+
+    def _kernel(
+        self, weights: Sequence[Complex], near: Places, omega: Real, angle: Real
+    ) -> tuple[WindowWeights, Complex]:
+        """Kernels of one record, (n_in, n_near, 2 · n_windows, n_bins), and whose they are."""
+        shares, detrend = self.windows.shares, self.windows.detrend
+        shape = (len(weights[0]), len(omega), 2 * len(shares), len(angle))
+        kernels = np.empty(shape, dtype=np.complex128)
+        for place, (share, weight) in enumerate(zip(shares, weights, strict=True)):
+            plan = share.plan
+            both = kept_transforms(plan.length, omega.tobytes(), angle.tobytes(), detrend)
+            turn = kept_turns(plan.length // 2, plan.hop, weight.shape[2], angle.tobytes())
+            into = kernels[:, :, 2 * place : 2 * place + 2]
+            mirrored_kernels(weight[:, near], turn, both, into)
+        kernels.setflags(write=False)
+        return self.windows, kernels
 
     def _noise_at(self, columns: Places, length: int) -> _BinNoise:
         omega: Real = np.asarray(2.0 * np.pi * columns / (length * self.sample_time_s))

@@ -2,7 +2,8 @@
 
 A fit of responses that takes out what windows add asks for the bases of the same windows at the
 same frequencies at each of its searches, under each hold, and for its errors; a study asks again
-for each axis, for errors that it shows and for its pictures. So it is with weights of windows.
+for each axis, for errors that it shows and for its pictures. So it is with weights of windows, and
+with the kernels that these make of noise.
 """
 
 from __future__ import annotations
@@ -18,11 +19,24 @@ from numpy.typing import NDArray
 from flightid.responses.windows.transform import FoldedBasis, WindowPlan
 
 MOST_BYTES = 1 << 26
-"""Of all that is kept: the bases of five windows at a hundred frequencies take less."""
+"""In one room: the bases of five windows at a hundred frequencies take less, as do the kernels of
+five windows in a record of 130 s (10 MB)."""
 Made = TypeVar("Made")
-_KEPT: ContextVar[dict[Hashable, tuple[object, int]] | None] = ContextVar(
-    "kept_bases", default=None
-)
+
+
+class _Room:
+    """What is kept of one kind, and its bytes."""
+
+    def __init__(self) -> None:
+        self.held: dict[Hashable, object] = {}
+        self.n_bytes = 0
+
+    def clear(self) -> None:
+        self.held.clear()
+        self.n_bytes = 0
+
+
+_KEPT: ContextVar[dict[str, _Room] | None] = ContextVar("kept_bases", default=None)
 
 
 @contextmanager
@@ -41,7 +55,7 @@ def bases_kept() -> Iterator[None]:
     if _KEPT.get() is not None:
         yield
         return
-    kept: dict[Hashable, tuple[object, int]] = {}
+    kept: dict[str, _Room] = {}
     token = _KEPT.set(kept)
     try:
         yield
@@ -60,7 +74,10 @@ def basis_of(plan: WindowPlan, omega: NDArray[np.float64], detrend: str) -> Fold
 
 
 def kept(
-    key: Callable[[], Hashable], make: Callable[[], Made], n_bytes: Callable[[Made], int]
+    key: Callable[[], Hashable],
+    make: Callable[[], Made],
+    n_bytes: Callable[[Made], int],
+    room: str = "bases",
 ) -> Made:
     """What `make` makes, or has made inside `bases_kept` for this key.
 
@@ -69,7 +86,9 @@ def kept(
     key, make : callable
         The key holds all that is made depends on.
     n_bytes : callable
-        Memory of what is made; what would fill the whole place is not kept.
+        Memory of what is made; what would fill the whole room is not kept.
+    room : str
+        What fills one room pushes nothing out of another.
 
     Example
     -------
@@ -78,16 +97,17 @@ def kept(
     ...      for made, size in ((1, MOST_BYTES + 1), (2, 8), (3, 8))]
     [1, 2, 2]
     """
-    held = _KEPT.get()
-    if held is None:
+    rooms = _KEPT.get()
+    if rooms is None:
         return make()
-    place = key()
-    if place in held:
-        return cast("Made", held[place][0])
+    held, place = rooms.setdefault(room, _Room()), key()
+    if place in held.held:
+        return cast("Made", held.held[place])
     made = make()
     size = n_bytes(made)
     if size <= MOST_BYTES:
-        if size + sum(each for _, each in held.values()) > MOST_BYTES:
+        if size + held.n_bytes > MOST_BYTES:
             held.clear()
-        held[place] = made, size
+        held.held[place] = made
+        held.n_bytes += size
     return made
