@@ -3,6 +3,7 @@
 pub mod complex_lanes;
 pub mod complex_lu;
 pub(crate) mod decay;
+pub(crate) mod died_away;
 pub mod dual;
 pub mod folded_frames;
 pub mod folded_rows;

@@ -1,5 +1,6 @@
 //! Derivatives of a state, column by column, taken over the steps of a trajectory. (Python side: none)
 
+use crate::numerics::died_away::leave_out;
 use crate::trajectories::sensitivity_flow::{Drive, Flow, Folded};
 use crate::trajectories::sensitivity_pattern::{GROUP, Samples, VECTOR, VECTORS};
 use crate::trajectories::step_map::StepMap;
@@ -9,9 +10,6 @@ use crate::trajectories::step_map::StepMap;
 #[repr(align(64))]
 pub(crate) struct Many(pub(crate) [[f64; VECTOR]; VECTORS]);
 const NONE: Many = Many([[0.0; VECTOR]; VECTORS]);
-/// Its square is no normal number: beside the squares of any column's other samples it is nothing, and
-/// numbers that are not normal take the processor fifty times as long.
-const TINY: f64 = 1e-154;
 /// Place of what drives a row, behind S of even and of odd steps.
 const DRIVEN: usize = 2;
 
@@ -107,12 +105,9 @@ impl ColumnSteps {
         row.0[place % GROUP / VECTOR][place % VECTOR]
     }
 
-    /// Leave out what has died away: what the state at the beginning does to a fast lag, after minutes.
+    /// Leave out what has died away.
     pub(crate) fn settle(&mut self) {
-        for row in &mut self.rows {
-            let entries = row[self.now].0.as_flattened_mut().iter_mut();
-            entries.filter(|entry| entry.abs() < TINY).for_each(|entry| *entry = 0.0);
-        }
+        self.rows.iter_mut().for_each(|row| leave_out(row[self.now].0.as_flattened_mut()));
     }
 
     /// Whether all derivatives are numbers.
