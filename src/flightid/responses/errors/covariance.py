@@ -204,7 +204,7 @@ class WindowedErrors(JointErrors):
                 partial(tuple, (*asked, id(self.windows), int(columns[0]), place)),
                 partial(self._kernel, weights, near, omega[near], angle),
                 lambda made: made[1].nbytes,
-                room="kernels",
+                shelf="kernels",
             )
             yield noise, kernels, near
 

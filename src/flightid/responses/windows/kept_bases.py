@@ -19,12 +19,12 @@ from numpy.typing import NDArray
 from flightid.responses.windows.transform import FoldedBasis, WindowPlan
 
 MOST_BYTES = 1 << 26
-"""In one room: the bases of five windows at a hundred frequencies take less, as do the kernels of
+"""On one shelf: the bases of five windows at a hundred frequencies take less, as do the kernels of
 five windows in a record of 130 s (10 MB)."""
 Made = TypeVar("Made")
 
 
-class _Room:
+class _Shelf:
     """What is kept of one kind, and its bytes."""
 
     def __init__(self) -> None:
@@ -36,7 +36,7 @@ class _Room:
         self.n_bytes = 0
 
 
-_KEPT: ContextVar[dict[str, _Room] | None] = ContextVar("kept_bases", default=None)
+_KEPT: ContextVar[dict[str, _Shelf] | None] = ContextVar("kept_bases", default=None)
 
 
 @contextmanager
@@ -55,7 +55,7 @@ def bases_kept() -> Iterator[None]:
     if _KEPT.get() is not None:
         yield
         return
-    kept: dict[str, _Room] = {}
+    kept: dict[str, _Shelf] = {}
     token = _KEPT.set(kept)
     try:
         yield
@@ -77,7 +77,7 @@ def kept(
     key: Callable[[], Hashable],
     make: Callable[[], Made],
     n_bytes: Callable[[Made], int],
-    room: str = "bases",
+    shelf: str = "bases",
 ) -> Made:
     """What `make` makes, or has made inside `bases_kept` for this key.
 
@@ -86,9 +86,9 @@ def kept(
     key, make : callable
         The key holds all that is made depends on.
     n_bytes : callable
-        Memory of what is made; what would fill the whole room is not kept.
-    room : str
-        What fills one room pushes nothing out of another.
+        Memory of what is made; what would fill the whole shelf is not kept.
+    shelf : str
+        What fills one shelf pushes nothing off another.
 
     Example
     -------
@@ -97,10 +97,10 @@ def kept(
     ...      for made, size in ((1, MOST_BYTES + 1), (2, 8), (3, 8))]
     [1, 2, 2]
     """
-    rooms = _KEPT.get()
-    if rooms is None:
+    shelves = _KEPT.get()
+    if shelves is None:
         return make()
-    held, place = rooms.setdefault(room, _Room()), key()
+    held, place = shelves.setdefault(shelf, _Shelf()), key()
     if place in held.held:
         return cast("Made", held.held[place])
     made = make()
