@@ -25,6 +25,8 @@ Array = NDArray[np.float64]
 SampledModel = PolynomialModel | InnovationsModel
 RANK = 1e-10
 """Directions of the initial state weaker than this share of the strongest are left at rest."""
+FADED = 1e-20
+"""Samples in which free motions are below this share of their largest tell nothing of the start."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,7 +164,9 @@ def _free_run(
     error = (data.outputs - forced)[:, :stretch].ravel()
     if not (np.all(np.isfinite(told)) and np.all(np.isfinite(error))):
         return forced, stretch, Shifts(np.zeros(0), np.zeros(p), np.zeros(len(motion)), 0, 0)
-    weights, _, rank, _ = np.linalg.lstsq(told, error, rcond=RANK)
+    size = np.max(np.abs(told), axis=1)
+    heard = size > FADED * np.max(size)
+    weights, _, rank, _ = np.linalg.lstsq(told[heard], error[heard], rcond=RANK)
     k = len(motion)
     bias = weights[k:] if request.output_bias else np.zeros(p)
     # One recursion from the start that was found, not one for each number of it.
