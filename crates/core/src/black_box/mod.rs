@@ -1,7 +1,10 @@
 //! Polynomial models and NARX: predictors, fits, scans of orders, choice of terms.
 
+pub(crate) mod armax_newton;
+pub(crate) mod armax_sums;
 pub mod candidates;
 pub mod digital_filter;
+pub(crate) mod lane_rows;
 pub mod local_regularisation;
 pub(crate) mod look_ahead;
 pub mod narx_prediction;
@@ -15,4 +18,5 @@ pub mod polynomial_predictor;
 pub mod radial_basis;
 pub(crate) mod remainder;
 pub(crate) mod rounded_columns;
+pub(crate) mod steady_answers;
 pub mod stop_rule;

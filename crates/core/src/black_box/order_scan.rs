@@ -6,17 +6,22 @@
 
 use rayon::prelude::*;
 
+use crate::black_box::armax_newton::Newton;
+use crate::black_box::armax_sums::Cut;
 use crate::black_box::digital_filter::add_product;
 use crate::black_box::polynomial_fit::{Before, PredictionError};
 use crate::black_box::polynomial_orders::Orders;
 use crate::black_box::polynomial_predictor::{Polynomials, Samples};
 use crate::error::CoreError;
 use crate::fits::least_squares::{Options, Problem, Progress};
-use crate::fits::levenberg_marquardt::minimise;
+use crate::fits::levenberg_marquardt::search;
 use crate::numerics::householder::{back_substitute, triangularise};
 
 /// A change of Akaike's criterion that ranks nothing.
 const FINEST: f64 = 0.02;
+/// Starts are near minima, and a structure that is larger than the data ask for has a valley that is a
+/// thousand times flatter across than along: more damping lets steps end in it.
+const FIRST_DAMPING: f64 = 1e-6;
 
 /// What is scanned, and on what.
 pub struct Scan<'a> {
@@ -108,11 +113,20 @@ pub fn scan(
     let innovations = long_errors(work, skip)?;
     let triangle = regressors(work, &largest, &innovations)?;
     let width = largest.orders.n_parameters() + 1;
+    let moving = work.candidates.iter().any(|orders| orders.c > 0);
+    let cuts: Vec<Cut> =
+        if moving { work.records.iter().map(Cut::of).collect() } else { Vec::new() };
+    let search = Search { work, cuts: &cuts, skip, stop };
     let one = |orders: &Orders| {
-        let start = downdated(&triangle, width, &largest.places(orders))?;
-        refine(work, orders, start, skip, stop)
+        let (theta, squares) = downdated(&triangle, width, &largest.places(orders))?;
+        if orders.c == 0 {
+            return Some(Scanned { theta, squares, iterations: 0, converged: true });
+        }
+        search.from(orders, &theta)
     };
-    Ok(work.candidates.par_iter().map(one).collect())
+    let mut found: Vec<_> = work.candidates.par_iter().map(one).collect();
+    search.again_from_smaller(&mut found);
+    Ok(found)
 }
 
 /// Errors of a long ARX model, zero where its lags reach before the record.
@@ -210,38 +224,97 @@ fn downdated(triangle: &[f64], width: usize, places: &[usize]) -> Option<(Vec<f6
     Some((theta, work[n * width + n].powi(2)))
 }
 
-fn refine(
-    work: &Scan<'_>,
-    orders: &Orders,
-    start: (Vec<f64>, f64),
+/// Searches of all structures on the same records.
+struct Search<'a> {
+    work: &'a Scan<'a>,
+    cuts: &'a [Cut],
     skip: usize,
-    stop: &(dyn Fn() -> bool + Sync),
-) -> Option<Scanned> {
-    let (theta, squares) = start;
-    if orders.c == 0 {
-        return Some(Scanned { theta, squares, iterations: 0, converged: true });
+    stop: &'a (dyn Fn() -> bool + Sync),
+}
+
+impl Search<'_> {
+    /// Least prediction errors from a start.
+    fn from(&self, orders: &Orders, start: &[f64]) -> Option<Scanned> {
+        let records = self.work.records.clone();
+        let mut problem =
+            PredictionError::new(orders.clone(), records, Before::Rest, self.skip, false).ok()?;
+        (problem.fast, problem.levels) = (true, self.work.levels);
+        let n = start.len();
+        let (low, high) = (vec![f64::NEG_INFINITY; n], vec![f64::INFINITY; n]);
+        let options = Options {
+            maximum_iterations: self.work.maximum_iterations,
+            gradient_tolerance: 1e-6,
+            step_tolerance: 1e-7,
+            cost_tolerance: FINEST / problem.n_residuals().max(1) as f64,
+            first_damping: FIRST_DAMPING,
+            ..Options::default()
+        };
+        let proceed = &mut |_: &Progress<'_>| !(self.stop)();
+        let mut objective = Newton::new(&mut problem, self.cuts);
+        let found = search(&mut objective, start, &low, &high, &options, proceed).ok()?;
+        Some(Scanned {
+            squares: found.cost,
+            iterations: found.iterations,
+            converged: found.termination.is_converged(),
+            theta: found.x,
+        })
     }
-    let records = work.records.clone();
-    let mut problem =
-        PredictionError::new(orders.clone(), records, Before::Rest, skip, false).ok()?;
-    (problem.fast, problem.levels) = (true, work.levels);
-    let n = theta.len();
-    let (low, high) = (vec![f64::NEG_INFINITY; n], vec![f64::INFINITY; n]);
-    let options = Options {
-        maximum_iterations: work.maximum_iterations,
-        gradient_tolerance: 1e-6,
-        step_tolerance: 1e-7,
-        cost_tolerance: FINEST / problem.n_residuals().max(1) as f64,
-        ..Options::default()
-    };
-    let proceed = &mut |_: &Progress<'_>| !stop();
-    let found = minimise(&mut problem, &theta, &low, &high, &options, proceed).ok()?;
-    Some(Scanned {
-        squares: found.cost,
-        iterations: found.iterations,
-        converged: found.termination.is_converged(),
-        theta: found.x,
-    })
+
+    /// A structure has at least as small errors as those within it: where its search ended above one,
+    /// it was at another minimum, and goes on from the smaller structure's.
+    ///
+    /// Structures of one size go side by side, the smallest first, so that threads change no bit.
+    fn again_from_smaller(&self, found: &mut [Option<Scanned>]) {
+        let candidates = &self.work.candidates;
+        let mut sizes: Vec<usize> = candidates.iter().map(Orders::n_parameters).collect();
+        sizes.sort_unstable();
+        sizes.dedup();
+        for size in sizes {
+            let better = |place: usize| {
+                let orders = &candidates[place];
+                let own = found[place].as_ref().filter(|_| orders.c > 0)?;
+                let (within, least) = (0..candidates.len())
+                    .filter(|&other| lies_within(&candidates[other], orders))
+                    .filter_map(|other| found[other].as_ref().map(|s| (other, s)))
+                    .min_by(|(_, a), (_, b)| a.squares.total_cmp(&b.squares))?;
+                if least.squares >= own.squares {
+                    return None;
+                }
+                let start = widened(&candidates[within], orders, &least.theta);
+                let again = self.from(orders, &start)?;
+                let iterations = own.iterations + again.iterations;
+                (again.squares < own.squares).then_some((place, Scanned { iterations, ..again }))
+            };
+            let of_size: Vec<usize> =
+                (0..candidates.len()).filter(|&k| candidates[k].n_parameters() == size).collect();
+            let made: Vec<_> = of_size.into_par_iter().filter_map(better).collect();
+            made.into_iter().for_each(|(place, better)| found[place] = Some(better));
+        }
+    }
+}
+
+/// Whether a structure is another with some last coefficients left out.
+fn lies_within(smaller: &Orders, larger: &Orders) -> bool {
+    let inputs = smaller.b.iter().zip(&larger.b).all(|(few, many)| few <= many);
+    let less = smaller.n_parameters() < larger.n_parameters();
+    less && inputs
+        && smaller.a <= larger.a
+        && smaller.c <= larger.c
+        && smaller.delays == larger.delays
+}
+
+/// Coefficients of the smaller structure in the larger one, the others zero.
+fn widened(smaller: &Orders, larger: &Orders, theta: &[f64]) -> Vec<f64> {
+    let counts = |orders: &Orders| [&[orders.a], &orders.b[..], &[orders.c]].concat();
+    let mut rest = theta;
+    let mut made = Vec::with_capacity(larger.n_parameters());
+    for (few, many) in counts(smaller).into_iter().zip(counts(larger)) {
+        let (head, tail) = rest.split_at(few);
+        rest = tail;
+        made.extend_from_slice(head);
+        made.resize(made.len() + many - few, 0.0);
+    }
+    made
 }
 
 #[cfg(test)]

@@ -105,6 +105,8 @@ pub struct Options {
     /// Whether the point that the last of the most steps reaches is linearised: where nobody asks for
     /// its slopes, a search of few steps saves one Jacobian of them.
     pub last_slopes: bool,
+    /// Damping of the first step, as a share of the columns' squares.
+    pub first_damping: f64,
 }
 
 impl Default for Options {
@@ -115,6 +117,7 @@ impl Default for Options {
             step_tolerance: 1e-12,
             cost_tolerance: 1e-15,
             last_slopes: true,
+            first_damping: 1e-3,
         }
     }
 }

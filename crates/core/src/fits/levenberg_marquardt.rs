@@ -82,6 +82,7 @@ pub fn search<O: Objective>(
     let mut x: Vec<f64> = (0..start.len()).map(|j| start[j].clamp(lower[j], upper[j])).collect();
     objective.project(&mut x);
     let mut search = Search::begin(objective, x, lower, upper)?;
+    search.damping = options.first_damping;
     let termination = loop {
         if let Some(reason) = search.finished(options) {
             break reason;
@@ -161,7 +162,7 @@ impl<'a> Search<'a> {
             x,
             cost: 0.0,
             first_cost: 0.0,
-            damping: 1e-3,
+            damping: 0.0,
             growth: 2.0,
             iterations: 0,
         };

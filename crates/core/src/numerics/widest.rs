@@ -14,3 +14,13 @@ pub fn widest<R>(work: impl FnOnce() -> R) -> R {
     }
     work()
 }
+
+/// As `widest`, in registers of eight doubles where there are such: for work on rows of eight.
+#[inline(always)]
+pub fn eight_wide<R>(work: impl FnOnce() -> R) -> R {
+    #[cfg(target_arch = "x86_64")]
+    if let Some(avx512) = Level::new().as_avx512() {
+        return avx512.vectorize(work);
+    }
+    widest(work)
+}

@@ -110,3 +110,45 @@ fn collinear_columns_and_short_records_are_told() {
     two.candidates.push(Orders { b: vec![1, 1], delays: vec![1, 1], ..orders(1, 1, 0, 1) });
     assert!(matches!(scan(&two, &|| false), Err(CoreError::Shape { .. })));
 }
+
+#[test]
+fn no_structure_ends_above_one_within_it() {
+    let mut source = Random::new(4);
+    let u: Vec<f64> = (0..3000).map(|_| source.normal().signum()).collect();
+    let e: Vec<f64> = (0..3000).map(|_| 0.3 * source.normal()).collect();
+    let mut y = vec![0.0; 3000];
+    add_product(1.0, &[0.5, 0.3, -0.1], 1, &u, &mut y);
+    add_product(1.0, &[1.0, -0.8, 0.3], 0, &e, &mut y);
+    divide(&[1.0, -2.2, 1.9, -0.65], &mut y);
+    let mut candidates = Vec::new();
+    for a in 1..3 {
+        for b in 1..5 {
+            candidates.extend((0..6).map(|c| orders(a, b, c, 1)));
+        }
+    }
+    let work = Scan {
+        records: vec![Samples { output: &y, inputs: vec![&u] }],
+        candidates: candidates.clone(),
+        long: 25,
+        maximum_iterations: 40,
+        levels: true,
+    };
+    let found = scan(&work, &|| false).unwrap();
+    let squares = |k: usize| found[k].as_ref().unwrap().squares;
+    for (k, larger) in candidates.iter().enumerate() {
+        for (j, smaller) in candidates.iter().enumerate() {
+            if lies_within(smaller, larger) && larger.c > 0 {
+                assert!(squares(k) <= squares(j), "{larger:?} above {smaller:?}");
+            }
+        }
+    }
+}
+
+#[test]
+fn coefficients_of_a_smaller_structure_keep_their_places() {
+    let (smaller, larger) = (orders(1, 2, 1, 1), orders(3, 2, 2, 1));
+    assert!(lies_within(&smaller, &larger) && !lies_within(&larger, &smaller));
+    assert!(!lies_within(&larger, &larger) && !lies_within(&orders(1, 2, 1, 2), &larger));
+    let made = widened(&smaller, &larger, &[1.0, 2.0, 3.0, 4.0]);
+    assert_eq!(made, [1.0, 0.0, 0.0, 2.0, 3.0, 4.0, 0.0]);
+}
