@@ -95,7 +95,8 @@ def _carried(inspection: InspectedLog) -> str:
         return "This log holds no flight, so it can carry no model."
     able = carried_axes(inspection)
     if able:
-        listed = able[0] if len(able) == 1 else f"{', '.join(able[:-1])} and {able[-1]}"
+        *others, last = able
+        listed = f"{', '.join(others)} and {last}" if others else last
         said = f"This log can carry a model of {listed}"
         if inspection.verdict is Light.RED:
             return f"{said}, but not as it is: see what is red."

@@ -294,7 +294,8 @@ def _freedom(weights: Array) -> float:
     centred = np.eye(len(weights)) - weights
     form = centred.T @ ((weights / (1.0 - weights)) ** 2 * centred.T).T
     square = float(np.sum(form * form.T))
-    return max(1.0, float(np.trace(form)) ** 2 / square) if square > 0.0 else 1.0
+    # At least one: eigenvalues are not negative, so squares sum to no more than their sum, squared.
+    return float(np.trace(form)) ** 2 / square if square > 0.0 else 1.0
 
 
 def larger(covariance: Array, other: Array) -> Array:
