@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy
 
-from flightid.record.sample_faults import _largest_near
+from flightid.record.outlying import _largest_near
 from flightid.review.rank_correlation import rank_correlation
 from flightid.uncertainty.quantiles import chi_squared_quantile
 
