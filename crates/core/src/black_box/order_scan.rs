@@ -247,6 +247,7 @@ impl Search<'_> {
             step_tolerance: 1e-7,
             cost_tolerance: FINEST / problem.n_residuals().max(1) as f64,
             first_damping: FIRST_DAMPING,
+            undamped_end: true,
             ..Options::default()
         };
         let proceed = &mut |_: &Progress<'_>| !(self.stop)();

@@ -107,6 +107,9 @@ pub struct Options {
     pub last_slopes: bool,
     /// Damping of the first step, as a share of the columns' squares.
     pub first_damping: f64,
+    /// Whether little that a damped step took away ends a search where an undamped one promises more,
+    /// as in a flat valley. Of variables without bounds.
+    pub undamped_end: bool,
 }
 
 impl Default for Options {
@@ -118,6 +121,7 @@ impl Default for Options {
             cost_tolerance: 1e-15,
             last_slopes: true,
             first_damping: 1e-3,
+            undamped_end: false,
         }
     }
 }

@@ -257,7 +257,9 @@ impl<'a> Search<'a> {
         };
         if options.last_slopes || self.iterations < options.maximum_iterations {
             self.linearise(objective)?;
-            return Ok(reason);
+            let promise: f64 = self.point.projected.iter().map(|q| q * q).sum();
+            let goes_on = options.undamped_end && promise > options.cost_tolerance * self.cost;
+            return Ok(reason.filter(|reason| *reason != Termination::Cost || !goes_on));
         }
         self.cost = cost;
         self.point.triangle.clear();
