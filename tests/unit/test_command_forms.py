@@ -70,6 +70,10 @@ def test_pages_of_inspect_and_fly(tmp_path: Path, capsys: pytest.CaptureFixture[
         run([*words, "--html", str(page)])
         assert said in page.read_text(), words
         page.unlink()
+    before = log.read_bytes()
+    assert run(["inspect", str(log), "--html", str(log)]) == 2
+    assert "name a page" in capsys.readouterr().err
+    assert log.read_bytes() == before
     capsys.readouterr()
 
 

@@ -16,6 +16,7 @@ from flightid.cli.output import (
     json_option,
     leave_by_verdict,
     note,
+    of_a_page,
 )
 
 FLEET_FILE = click.Path(exists=True, path_type=Path)
@@ -166,7 +167,12 @@ def query(
 
 @command.command("report", short_help="One page: vehicles, types, what changed, refused logs.")
 @click.argument("place", metavar="FLEET | CATALOGUE")
-@click.option("--html", type=WRITTEN, help="Write the page to this file instead of printing text.")
+@click.option(
+    "--html",
+    type=WRITTEN,
+    callback=of_a_page,
+    help="Write the page to this file instead of printing text.",
+)
 @json_option
 def report(place: str, html: Path | None, as_json: bool) -> None:
     """Answer the questions of a fleet file from its catalogue, on one page.

@@ -22,6 +22,13 @@ WRITTEN = click.Path(dir_okay=False, path_type=Path)
 """A file that a command writes."""
 
 
+def of_a_page(context: click.Context, option: click.Parameter, path: Path | None) -> Path | None:
+    """Refuse what is no name of a page: a log would be lost that a mistyped command names there."""
+    if path is not None and path.suffix.lower() not in (".html", ".htm"):
+        raise click.BadParameter(f"{path} does not end in .html: name a page.", context, option)
+    return path
+
+
 class Exit(IntEnum):
     """Exit codes of every command."""
 

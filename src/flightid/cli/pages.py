@@ -8,7 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from flightid.cli.output import WRITTEN, Function, emit, emit_values, leave_by_verdict, note
+from flightid.cli.output import (
+    WRITTEN,
+    Function,
+    emit,
+    emit_values,
+    leave_by_verdict,
+    note,
+    of_a_page,
+)
 
 if TYPE_CHECKING:
     from flightid.report.content import Document
@@ -21,6 +29,7 @@ def html_option(function: Function) -> Function:
     decorate = click.option(
         "--html",
         type=WRITTEN,
+        callback=of_a_page,
         help="Write a page with numbers and pictures to this file.",
     )
     return decorate(function)

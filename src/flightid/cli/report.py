@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from flightid.cli.output import WRITTEN, emit_values, json_option, leave_by_verdict, note
+from flightid.cli.output import WRITTEN, emit_values, json_option, leave_by_verdict, note, of_a_page
 
 
 @click.command()
@@ -14,6 +14,7 @@ from flightid.cli.output import WRITTEN, emit_values, json_option, leave_by_verd
 @click.option(
     "--html",
     type=WRITTEN,
+    callback=of_a_page,
     help="Write the page to this file instead of printing text.",
 )
 @click.option(

@@ -9,7 +9,7 @@ import click
 
 from flightid.cli.figures import QuotientRange
 from flightid.cli.option_fields import OptionsCommand, flags_of, parted
-from flightid.cli.output import WRITTEN, emit, json_option, note
+from flightid.cli.output import WRITTEN, emit, json_option, note, of_a_page
 from flightid.cli.records import FILES, FilesArgument, read_files, reading, write_out
 from flightid.cli.sources import load_source, model_argument, model_options
 
@@ -99,7 +99,7 @@ def _fields() -> dict[str, type[Options]]:
 @click.argument("records", nargs=-1, type=FILES, cls=FilesArgument)
 @model_options
 @click.option("--write", "target", type=WRITTEN, help="Write .csv, .parquet or .nc.")
-@click.option("--html", type=WRITTEN, help="Write a page with time histories.")
+@click.option("--html", type=WRITTEN, callback=of_a_page, help="Write a page with time histories.")
 @json_option
 def model(
     model: str,

@@ -34,7 +34,7 @@ from flightid.logs.source import Event
 from flightid.logs.table_source import Array, MessageRows, TableSource
 from flightid.reading import bounded_bytes, memory_budget, within_memory
 
-HEADING = re.compile(rb'^\s*"?loopIteration"?, ?"?time(?: \([a-z]+\))?"?,', re.MULTILINE)
+HEADING = re.compile(rb'^[ \t]*"?loopIteration"?, ?"?time(?: \([a-z]+\))?"?,', re.MULTILINE)
 """How the columns of every decoder begin."""
 UNIT = re.compile(r"(?P<name>.*?) \((?P<unit>[^)]*)\)")
 LARGEST_HEADING = 1 << 20
