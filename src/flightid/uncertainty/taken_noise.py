@@ -145,7 +145,9 @@ class TakenNoise:
             for each in self._apart(record, output)
             if each.shape[1]
         ]
-        return np.concatenate(parts, axis=1)
+        return (
+            np.concatenate(parts, axis=1) if parts else np.zeros((self._n_bins, 0), np.complex128)
+        )
 
     def _squared(self, record: int, output: int) -> Array:
         return self._taken[record].squares(output)
