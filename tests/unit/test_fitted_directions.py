@@ -59,7 +59,7 @@ def test_lags_reach_beyond_rows_that_are_turned_together() -> None:
         for n_lags, own in ((1, 0), (2, 2), (6, 3)):
             found = lags_of_form(columns[:, :own], columns[:, own:], form, n_lags)
             wanted = [np.trace(among, offset=lag) for lag in range(n_lags)]
-            assert_close(found, wanted, atol=1e-9, why="the sum written out")
+            assert_close(found, wanted, atol=1e-10, why="the sum written out")
 
 
 def test_lags_and_power_are_those_of_the_covariance_that_is_left() -> None:
