@@ -294,26 +294,38 @@ impl Search<'_> {
     }
 }
 
-/// Whether a structure is another with some last coefficients left out.
+/// Whether a structure is another with some of its coefficients zero.
 fn lies_within(smaller: &Orders, larger: &Orders) -> bool {
-    let inputs = smaller.b.iter().zip(&larger.b).all(|(few, many)| few <= many);
+    let covers = |i: usize| {
+        let (from, to) = (smaller.delays[i], smaller.delays[i] + smaller.b[i]);
+        let (first, last) = (larger.delays[i], larger.delays[i] + larger.b[i]);
+        smaller.b[i] == 0 || (first <= from && to <= last)
+    };
     let less = smaller.n_parameters() < larger.n_parameters();
-    less && inputs
-        && smaller.a <= larger.a
+    less && smaller.a <= larger.a
         && smaller.c <= larger.c
-        && smaller.delays == larger.delays
+        && smaller.b.len() == larger.b.len()
+        && (0..larger.b.len()).all(covers)
 }
 
 /// Coefficients of the smaller structure in the larger one, the others zero.
 fn widened(smaller: &Orders, larger: &Orders, theta: &[f64]) -> Vec<f64> {
     let counts = |orders: &Orders| [&[orders.a], &orders.b[..], &[orders.c]].concat();
+    // Of each input: coefficients of the larger structure before the first of the smaller one.
+    let inputs = (0..larger.b.len()).map(|i| match smaller.b[i] {
+        0 => 0,
+        _ => smaller.delays[i] - larger.delays[i],
+    });
+    let ahead = [0].into_iter().chain(inputs).chain([0]);
     let mut rest = theta;
     let mut made = Vec::with_capacity(larger.n_parameters());
-    for (few, many) in counts(smaller).into_iter().zip(counts(larger)) {
+    for ((few, many), zeros) in counts(smaller).into_iter().zip(counts(larger)).zip(ahead) {
         let (head, tail) = rest.split_at(few);
         rest = tail;
+        let end = made.len() + many;
+        made.resize(made.len() + zeros, 0.0);
         made.extend_from_slice(head);
-        made.resize(made.len() + many - few, 0.0);
+        made.resize(end, 0.0);
     }
     made
 }

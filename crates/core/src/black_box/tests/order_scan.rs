@@ -124,6 +124,7 @@ fn no_structure_ends_above_one_within_it() {
     for a in 1..3 {
         for b in 1..5 {
             candidates.extend((0..6).map(|c| orders(a, b, c, 1)));
+            candidates.extend((1..3).map(|c| orders(a, b, c, 2)));
         }
     }
     let work = Scan {
@@ -149,6 +150,9 @@ fn coefficients_of_a_smaller_structure_keep_their_places() {
     let (smaller, larger) = (orders(1, 2, 1, 1), orders(3, 2, 2, 1));
     assert!(lies_within(&smaller, &larger) && !lies_within(&larger, &smaller));
     assert!(!lies_within(&larger, &larger) && !lies_within(&orders(1, 2, 1, 2), &larger));
+    let (later, sooner) = (orders(1, 1, 1, 2), orders(1, 3, 1, 1));
+    assert!(lies_within(&later, &sooner) && !lies_within(&orders(1, 1, 1, 0), &sooner));
+    assert_eq!(widened(&later, &sooner, &[1.0, 2.0, 3.0]), [1.0, 0.0, 2.0, 0.0, 3.0]);
     let made = widened(&smaller, &larger, &[1.0, 2.0, 3.0, 4.0]);
     assert_eq!(made, [1.0, 0.0, 0.0, 2.0, 3.0, 4.0, 0.0]);
 }
