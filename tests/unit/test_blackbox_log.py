@@ -216,6 +216,9 @@ def test_header_that_contradicts_itself_is_refused(tmp_path: Path, name: str, va
     path.write_bytes(header() + f"H {name}:{value}\n".encode() + END)
     with pytest.raises(LogFormatError):
         open_blackbox(path)
+    path.write_bytes(blackbox(_columns(n=64))[: len(header()) + 3])
+    with pytest.raises(LogFormatError, match="no frame of the loop"):
+        open_blackbox(path)
 
 
 def test_fields_that_take_no_bytes_do_not_fill_memory(tmp_path: Path) -> None:

@@ -65,6 +65,13 @@ def open_blackbox(path: Path) -> TableSource:
     firmware = firmware_of(header.get(REVISION, ""))
     scales, untold = scales_of(header)
     tables = dict(_tables(native, scales, untold))
+    if LOOP not in tables:
+        raise LogFormatError(
+            f"{path.name} holds no frame of the loop",
+            found=f"a header and {len(data):,} bytes",
+            needed="main frames behind it",
+            action="take the log off the board anew: this one ends before the flight",
+        )
     tables, sticks = with_set_points(tables, header)
     lost = [ByteRange(*part) for part in native.skipped()]
     return TableSource(
@@ -75,7 +82,7 @@ def open_blackbox(path: Path) -> TableSource:
         settings_of(header),
         events=_events(native, INAV_MODES if firmware.is_inav else MODES),
         skipped=lost,
-        gaps=gaps_of(tables[LOOP].time_s) if LOOP in tables else (),
+        gaps=gaps_of(tables[LOOP].time_s),
         findings=(
             *_left_out(native, untold),
             *sticks,
