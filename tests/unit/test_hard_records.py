@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import flightid as fid
-from flightid.errors import FitError
+from flightid.errors import DataError, FitError
 from flightid.models import Output, Parameter, Parameters, StateSpaceModel
 from tests.closeness import assert_close
 from tests.truth.test_equation_records_truth import flown, longitudinal, stepped, unstable_flight
@@ -69,3 +69,20 @@ def test_equations_that_lose_a_derivative_are_a_fit_error() -> None:
     model = _scalar("(a - b)*x'", "u - x + x^2", "s", a=1.0, b=1.0)
     with pytest.raises(FitError, match=r"diverged from every start.*singular"):
         fid.identify(model, _response())
+
+
+@pytest.mark.parametrize(
+    ("step_s", "size", "said"),
+    [
+        (0.01, 1e155, "too large"),
+        (0.01, 5e-324, "too small"),
+        (1e-300, 1.0, "sample time"),
+        (1e300, 1.0, "sample time"),
+    ],
+)
+def test_what_no_product_can_hold_is_refused(step_s: float, size: float, said: str) -> None:
+    samples = size * np.sin(np.arange(50.0))
+    with pytest.raises(DataError, match=said):
+        fid.Record.from_arrays(step_s * np.arange(50), outputs={"y": samples})
+    samples[:] = 0.0
+    fid.Record.from_arrays(0.01 * np.arange(50), outputs={"y": samples})

@@ -39,7 +39,8 @@ class LabelledSamples:
     Raises
     ------
     DataError
-        Stamps that are not finite, not increasing or not uniform; samples that are not finite.
+        Stamps that are not finite, not increasing or not uniform; samples that are not finite, or
+        whose powers are not.
     """
 
     __slots__ = (

@@ -22,6 +22,8 @@ REPEATING = 0.5
 """Least correlation of inputs a declared period apart."""
 FEWEST_COMPARED = 8
 """Samples beyond the first period below which a record tells nothing of it."""
+LARGEST, SMALLEST = 1e75, 1e-75
+"""Of a channel's largest sample, and of a sample time: beyond, fourth powers are no numbers."""
 AT_ONCE = 1 << 14
 """Stamps that are compared at once."""
 TIME = "time_s"
@@ -92,7 +94,10 @@ def unknown_channel(name: str, channels: Iterable[str]) -> UnknownNameError:
 
 
 def require_finite(name: str, samples: NDArray[np.float64]) -> None:
-    """Refuse samples that are not finite."""
+    """Refuse samples that are not finite, or whose powers are not."""
+    peak = float(np.max(np.abs(samples)))
+    if peak == 0.0 or SMALLEST <= peak <= LARGEST:
+        return
     bad = np.flatnonzero(~np.isfinite(samples))
     if bad.size:
         raise DataError(
@@ -101,6 +106,12 @@ def require_finite(name: str, samples: NDArray[np.float64]) -> None:
             needed="finite numbers",
             action="cut the segment, or fill gaps with a stated policy when resampling",
         )
+    raise DataError(
+        f"channel {name!r} is too {'large' if peak > LARGEST else 'small'} to be worked with",
+        found=f"samples up to {peak:.3g}, at index {int(np.argmax(np.abs(samples)))}",
+        needed=f"a largest sample from {SMALLEST:g} to {LARGEST:g}, or zeros alone",
+        action="cut the segment before the fault, or scale the channel to another unit",
+    )
 
 
 def require_period(
@@ -161,6 +172,13 @@ def uniform_sample_time(time_s: NDArray[np.float64]) -> float:
     sample_time_s = float(time_s[-1] - time_s[0]) / (time_s.size - 1)
     if sample_time_s <= 0:
         raise DataError("time stamps do not increase", needed="increasing stamps in seconds")
+    if not SMALLEST <= sample_time_s <= LARGEST:
+        raise DataError(
+            "the sample time is no time of a flight",
+            found=f"{sample_time_s:.3g} s",
+            needed=f"{SMALLEST:g} s to {LARGEST:g} s",
+            action="look whether the time column is what it is taken for, and in which unit",
+        )
     worst = _farthest(time_s, sample_time_s) / sample_time_s
     if worst > UNIFORM_TOLERANCE:
         step = rounded_step_s(time_s)
