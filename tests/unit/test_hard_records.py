@@ -86,3 +86,11 @@ def test_what_no_product_can_hold_is_refused(step_s: float, size: float, said: s
         fid.Record.from_arrays(step_s * np.arange(50), outputs={"y": samples})
     samples[:] = 0.0
     fid.Record.from_arrays(0.01 * np.arange(50), outputs={"y": samples})
+
+
+def test_inputs_that_alternate_have_no_harmonic_to_take() -> None:
+    u = np.resize([1.0, -1.0], 2000)
+    record = fid.Record.from_arrays(0.01 * np.arange(2000), inputs={"u": u}, outputs={"y": u})
+    assert "periodic" not in str(fid.estimate_response(record).history)
+    with pytest.raises(DataError, match="no harmonic"):
+        fid.estimate_response(record.declare(period_s=0.02), estimator="periodic")

@@ -20,6 +20,7 @@ from flightid.frozen import dataclass
 from flightid.record.commanded_edges import Surroundings, answered, answers
 from flightid.record.outlying import FAR, HALF_WIDTH, HARMFUL, NORMAL_MAD, alone
 from flightid.record.repeats import measured_rows, rests_within_a_count, stands_still
+from flightid.record.validation import LARGEST
 from flightid.units import DIMENSIONLESS, is_convertible, si_base
 
 Array = NDArray[np.float64]
@@ -104,7 +105,8 @@ def sample_faults(
         present = np.isfinite(samples) & np.isfinite(time_s)
         stamps, values = time_s[present], samples[present]
         signs = _Signs.of(stamps, values)
-    if values.size < FEWEST or signs.range == 0.0:
+    # A record refuses by name what is larger than can be worked with.
+    if values.size < FEWEST or not 0.0 < signs.range <= LARGEST:
         return []
     spikes, rests = _spikes, [_dead, _held, _clipped]
     if role in (Role.INPUT, Role.EXCITATION):

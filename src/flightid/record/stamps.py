@@ -25,8 +25,8 @@ WALK = 0.25
 
 
 def mean_spacing_s(stamps: NDArray[np.float64]) -> float:
-    """Mean spacing of stamps outside gaps, s; 0 below two."""
-    spacing = np.diff(stamps)
+    """Mean spacing of finite stamps outside gaps, s; 0 below two."""
+    spacing = np.diff(stamps[np.isfinite(stamps)])
     if not spacing.size:
         return 0.0
     return float(np.mean(spacing[spacing <= GAP_FACTOR * np.median(spacing)]))

@@ -21,6 +21,8 @@ REACH = 0.1
 WEAK = 0.03
 """Of its own size squared, the variance of what excitations move of an input from which on nobody
 knows what they move: 17 % of standard error."""
+NONE = 1e-200
+"""Power that is none: of the smallest channels that a record takes the whole has 1e-150."""
 LEAST_PART = 1e-12
 """Of a direction's power, below which it is rounding."""
 
@@ -71,6 +73,8 @@ def local_spread(
     for at, omega in enumerate(omega_rad_s):
         places = [around(bins, float(omega), _count(bins, omega, needed)) for bins in known]
         square, crossed, power = _normal(known, moved, places, float(omega))
+        if np.all(np.real(np.diag(square)) < NONE):
+            continue
         inverse = _inverse(square)
         spread, gains = inverse[:: ORDER + 1, :: ORDER + 1], inverse @ crossed
         # From instruments to inputs: one where the inputs are their own instruments.

@@ -214,9 +214,16 @@ def _harmonics(
     bins: Sequence[Bins], periods: Sequence[int], n_in: int, omega: NDArray[np.float64]
 ) -> NDArray[np.intp]:
     """Numbers of the excited harmonics nearest to the wanted frequencies."""
-    base = bins[0].omega[periods[0] - 1]
     last = min((len(b.omega) - BESIDE - 1) // p for b, p in zip(bins, periods, strict=True))
     first = -(-(BESIDE + 2) // min(periods))
+    if last < first:
+        raise DataError(
+            "the period has no harmonic with room beside it",
+            found=f"{max(periods)} periods in a record of {2 * len(bins[0].omega)} samples",
+            needed="periods of many samples",
+            action="check period_s, or excite below the Nyquist frequency",
+        )
+    base = bins[0].omega[periods[0] - 1]
     numbers = np.arange(first, last + 1)
     power, beside = np.zeros(len(numbers)), np.zeros(len(numbers))
     for one, count in zip(bins, periods, strict=True):
