@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
 import pytest
 
 import flightid as fid
@@ -45,6 +46,19 @@ def test_a_scan(files, capsys):
     )
     assert code == 0, err
     assert "ranked by free run" in out
+
+
+def test_a_scan_tells_what_makes_its_best_red(tmp_path, capsys):
+    random = np.random.default_rng(0)
+    u = random.standard_normal(1000)
+    y = 2.0 * u + 0.02 * random.standard_normal(1000)
+    record = fid.Record.from_arrays(0.01 * np.arange(1000), inputs={"u": u}, outputs={"y": y})
+    path = str(fid.write_records(record, tmp_path / "gain.parquet"))
+    words = [path, "--scan", "--kind", "arx", "--na", "1", "--nb", "1", "--validation", path]
+    code, _, err = _run(capsys, *words)
+    assert code == 1
+    assert "The best, of itself: [red] whether a loop is closed cannot be told" in err
+    assert "nk 0" in _run(capsys, *words, "--nk", "0")[1]
 
 
 def test_what_is_missing_is_said(files, capsys):

@@ -13,6 +13,7 @@ from flightid.cli.option_fields import OptionsCommand, parted
 from flightid.cli.output import all_option, emit, json_option, leave_by_verdict, level_option, note
 from flightid.cli.pages import html_option, model_file_option, write_page
 from flightid.cli.records import FILES, FilesArgument, read_files, reading
+from flightid.conventions import Light
 
 if TYPE_CHECKING:
     from flightid.options import Options
@@ -97,6 +98,9 @@ def command(
         )
         emit(scanned, as_json=as_json, level=level)
         fit, findings = scanned.best, scanned.findings
+        # The table of a scan tells of none of its fits; the exit code heeds the best one's.
+        for each in (each for each in fit.evidence.findings if each.light is Light.RED):
+            note(f"The best, of itself: {each}")
     elif kind == "any":
         raise click.UsageError("--kind any ranks kinds: add --scan and --validation")
     else:
@@ -118,5 +122,5 @@ def command(
 
 
 def _tried(values: tuple[int, ...]) -> tuple[int, ...]:
-    """Orders of a scan: one number stands for all from 1 up to it."""
-    return values if len(values) > 1 else tuple(range(1, values[0] + 1))
+    """Orders of a scan: one number stands for all from 1 up to it, or for itself where it is 0."""
+    return values if len(values) > 1 else tuple(range(min(1, values[0]), values[0] + 1))

@@ -39,8 +39,7 @@ class LabelledSamples:
     Raises
     ------
     DataError
-        Stamps that are not finite, not increasing or not uniform; samples that are not finite, or
-        whose powers are not.
+        Stamps that are not finite, not increasing or not uniform; samples that are not finite.
     """
 
     __slots__ = (

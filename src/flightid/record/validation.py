@@ -55,7 +55,7 @@ def labelled_samples(
     notes: Mapping[str, str],
     trim: Mapping[str, float],
 ) -> dict[Channel, NDArray[np.float64]]:
-    """Samples by channel; refused where a channel has two roles or a label no channel."""
+    """Samples by channel; refused: two roles, a label of no channel, samples beyond all measure."""
     found: dict[str, tuple[Channel, NDArray[np.float64]]] = {}
     for role, group in groups.items():
         for key, samples in group.items():
@@ -64,7 +64,9 @@ def labelled_samples(
                     "a channel is named twice", found=key, needed="one role for each channel"
                 )
             channel = Channel(key, units.get(key, DIMENSIONLESS), role, notes.get(key, ""))
-            found[key] = channel, own_samples(channel, samples, time_s)
+            values = own_samples(channel, samples, time_s)
+            _require_size(key, values)
+            found[key] = channel, values
     for label in (*units, *trim, *notes):
         if label not in found:
             raise unknown_channel(label, found)
@@ -94,10 +96,7 @@ def unknown_channel(name: str, channels: Iterable[str]) -> UnknownNameError:
 
 
 def require_finite(name: str, samples: NDArray[np.float64]) -> None:
-    """Refuse samples that are not finite, or whose powers are not."""
-    peak = float(np.max(np.abs(samples)))
-    if peak == 0.0 or SMALLEST <= peak <= LARGEST:
-        return
+    """Refuse samples that are not finite."""
     bad = np.flatnonzero(~np.isfinite(samples))
     if bad.size:
         raise DataError(
@@ -106,6 +105,14 @@ def require_finite(name: str, samples: NDArray[np.float64]) -> None:
             needed="finite numbers",
             action="cut the segment, or fill gaps with a stated policy when resampling",
         )
+
+
+def _require_size(name: str, samples: NDArray[np.float64]) -> None:
+    """Refuse measured samples whose powers are no numbers; what a model's run makes may explode."""
+    peak = float(np.max(np.abs(samples), initial=0.0))
+    # What is not finite is told as that.
+    if peak == 0.0 or SMALLEST <= peak <= LARGEST or not np.isfinite(peak):
+        return
     raise DataError(
         f"channel {name!r} is too {'large' if peak > LARGEST else 'small'} to be worked with",
         found=f"samples up to {peak:.3g}, at index {int(np.argmax(np.abs(samples)))}",
