@@ -71,21 +71,26 @@ def test_equations_that_lose_a_derivative_are_a_fit_error() -> None:
         fid.identify(model, _response())
 
 
-@pytest.mark.parametrize(
-    ("step_s", "size", "said"),
-    [
-        (0.01, 1e155, "too large"),
-        (0.01, 5e-324, "too small"),
-        (1e-300, 1.0, "sample time"),
-        (1e300, 1.0, "sample time"),
-    ],
-)
-def test_what_no_product_can_hold_is_refused(step_s: float, size: float, said: str) -> None:
-    samples = size * np.sin(np.arange(50.0))
-    with pytest.raises(DataError, match=said):
-        fid.Record.from_arrays(step_s * np.arange(50), outputs={"y": samples})
-    samples[:] = 0.0
-    fid.Record.from_arrays(0.01 * np.arange(50), outputs={"y": samples})
+def test_what_no_product_can_hold_is_refused_where_it_is_worked_with() -> None:
+    for step_s in (1e-300, 1e300):
+        with pytest.raises(DataError, match="sample time"):
+            fid.Record.from_arrays(step_s * np.arange(50), outputs={"y": np.arange(50.0)})
+    time_s, u = 0.01 * np.arange(500), np.random.default_rng(0).standard_normal(500)
+    arx = fid.PolynomialModel.arx(["u"], "y", na=1, nb=1)
+    lag = fid.load_model("rate_first_order")
+    for size, said in ((1e155, "too large"), (5e-324, "too small")):
+        y = np.round(1e3 * u) * size if size < 1.0 else np.where(np.arange(500) == 300, size, u)
+        record = fid.Record.from_arrays(time_s, inputs={"u": u}, outputs={"y": y})
+        rate = fid.Record.from_arrays(
+            time_s, inputs={lag.inputs[0]: u}, outputs={lag.outputs[0]: y}, units=dict(lag.units)
+        )
+        for work in (
+            lambda record=record: fid.estimate_response(record),
+            lambda record=record: fid.identify(arx, record),
+            lambda rate=rate: fid.identify(lag, rate),
+        ):
+            with pytest.raises(DataError, match=said):
+                work()
 
 
 def test_inputs_that_alternate_have_no_harmonic_to_take() -> None:

@@ -113,7 +113,7 @@ class Record(LabelledSamples, Result, schema="flightid.record/1"):
         ShapeError
             An array is not as long as `time_s`.
         DataError
-            Stamps not uniform; a sample not finite, too large or too small to be worked with.
+            Stamps not uniform, or a sample not finite.
         UnknownNameError
             A unit, note or trim value for a channel that is not there.
         """

@@ -105,7 +105,7 @@ def sample_faults(
         present = np.isfinite(samples) & np.isfinite(time_s)
         stamps, values = time_s[present], samples[present]
         signs = _Signs.of(stamps, values)
-    # A record refuses by name what is larger than can be worked with.
+    # What is larger is refused by name where it is worked with.
     if values.size < FEWEST or not 0.0 < signs.range <= LARGEST:
         return []
     spikes, rests = _spikes, [_dead, _held, _clipped]

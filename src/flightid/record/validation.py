@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from functools import partial
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -17,6 +19,9 @@ from flightid.record.stamps import (
     rounded_step_s,
 )
 from flightid.units import DIMENSIONLESS
+
+if TYPE_CHECKING:
+    from flightid.record.samples import LabelledSamples
 
 REPEATING = 0.5
 """Least correlation of inputs a declared period apart."""
@@ -55,7 +60,7 @@ def labelled_samples(
     notes: Mapping[str, str],
     trim: Mapping[str, float],
 ) -> dict[Channel, NDArray[np.float64]]:
-    """Samples by channel; refused: two roles, a label of no channel, samples beyond all measure."""
+    """Samples by channel; refused where a channel has two roles or a label no channel."""
     found: dict[str, tuple[Channel, NDArray[np.float64]]] = {}
     for role, group in groups.items():
         for key, samples in group.items():
@@ -64,9 +69,7 @@ def labelled_samples(
                     "a channel is named twice", found=key, needed="one role for each channel"
                 )
             channel = Channel(key, units.get(key, DIMENSIONLESS), role, notes.get(key, ""))
-            values = own_samples(channel, samples, time_s)
-            _require_size(key, values)
-            found[key] = channel, values
+            found[key] = channel, own_samples(channel, samples, time_s)
     for label in (*units, *trim, *notes):
         if label not in found:
             raise unknown_channel(label, found)
@@ -107,11 +110,29 @@ def require_finite(name: str, samples: NDArray[np.float64]) -> None:
         )
 
 
+def require_workable(record: LabelledSamples, channels: Iterable[str]) -> None:
+    """Refuse channels of which no powers are numbers.
+
+    A record keeps them, for it is written and read to the last bit; what works on them asks here.
+
+    Raises
+    ------
+    DataError
+        A channel's largest sample is above 1e75, or below 1e-75 and not zero.
+
+    Example
+    -------
+    >>> from flightid.record import Record
+    >>> record = Record.from_arrays([0.0, 0.1], outputs={"p": [1.0, 2.0]})
+    >>> require_workable(record, ["p"])
+    """
+    for name in channels:
+        record.once(("workable", name), partial(_require_size, name, record[name]))
+
+
 def _require_size(name: str, samples: NDArray[np.float64]) -> None:
-    """Refuse measured samples whose powers are no numbers; what a model's run makes may explode."""
-    peak = float(np.max(np.abs(samples), initial=0.0))
-    # What is not finite is told as that.
-    if peak == 0.0 or SMALLEST <= peak <= LARGEST or not np.isfinite(peak):
+    peak = float(np.max(np.abs(samples)))
+    if peak == 0.0 or SMALLEST <= peak <= LARGEST:
         return
     raise DataError(
         f"channel {name!r} is too {'large' if peak > LARGEST else 'small'} to be worked with",

@@ -21,6 +21,7 @@ from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.first_sample import first_outputs
 from flightid.record import Record
 from flightid.record.several import as_records
+from flightid.record.validation import require_workable
 from flightid.units import require_match
 
 Array = NDArray[np.float64]
@@ -151,7 +152,7 @@ def prepare_records(
     FitError
         The model has no free parameter.
     DataError
-        A record is too short.
+        A record is too short, or its samples are too large or too small to be worked with.
     UnknownNameError
         A record lacks a channel of the model.
     UnitError
@@ -169,6 +170,7 @@ def prepare_records(
     for record in records:
         for name in (*model.inputs, *model.outputs):
             require_match(name, record.unit(name), model.units[name], record=str(record.name))
+        require_workable(record, (*model.inputs, *model.outputs))
         shift_in, shift_out = (
             np.array(
                 [

@@ -13,6 +13,7 @@ from flightid.errors import DataError, OptionError
 from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.record.hold import SAME_SAMPLE_TIME
+from flightid.record.validation import require_workable
 from flightid.units import clash, match
 
 Array = NDArray[np.float64]
@@ -126,7 +127,7 @@ def gather_channels(
     Raises
     ------
     DataError
-        No record, or sample times that differ.
+        No record, sample times that differ, or samples too large or too small to be worked with.
     UnitError
         A channel has another unit in a later record.
     OptionError
@@ -156,6 +157,8 @@ def gather_channels(
         for name in names:
             if record.unit(name) != units[name]:
                 raise clash(name, record.unit(name), units[name], where="in another record")
+    for record in records:
+        require_workable(record, names)
     removed = tuple(_offsets(record, names, offsets) for record in records)
     rows = [
         np.concatenate([r[name] - o[name] for r, o in zip(records, removed, strict=True)])

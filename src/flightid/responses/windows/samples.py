@@ -14,6 +14,7 @@ from flightid.record.checks import CHECK, checked_history
 from flightid.record.history import Step
 from flightid.record.hold import SAME_SAMPLE_TIME
 from flightid.record.several import as_records
+from flightid.record.validation import require_workable
 from flightid.units import clash
 
 
@@ -72,7 +73,8 @@ def gather(
     Raises
     ------
     DataError
-        No record, no input or output, or sample times that differ.
+        No record, no input or output, sample times that differ, or samples that are too large or
+        too small to be worked with.
     UnitError
         A channel has different units in two records.
     UnknownNameError
@@ -97,6 +99,7 @@ def gather(
     _require_agreement(listed, every)
     arrays = []
     for record in listed:
+        require_workable(record, every)
         matrix = record.matrix(every)
         arrays.append(matrix if keep_mean else matrix - matrix.mean(axis=1, keepdims=True))
     return Samples(
