@@ -71,7 +71,7 @@ def test_equations_that_lose_a_derivative_are_a_fit_error() -> None:
         fid.identify(model, _response())
 
 
-def test_what_no_product_can_hold_is_refused_where_it_is_worked_with() -> None:
+def test_samples_without_power_or_beyond_all_powers_end_in_words() -> None:
     for step_s in (1e-300, 1e300):
         with pytest.raises(DataError, match="sample time"):
             fid.Record.from_arrays(step_s * np.arange(50), outputs={"y": np.arange(50.0)})
@@ -91,9 +91,7 @@ def test_what_no_product_can_hold_is_refused_where_it_is_worked_with() -> None:
         ):
             with pytest.raises(DataError, match=said):
                 work()
-
-
-def test_inputs_that_alternate_have_no_harmonic_to_take() -> None:
+    # Power at the Nyquist frequency alone: no harmonic to take, and none to divide by.
     u = np.resize([1.0, -1.0], 2000)
     record = fid.Record.from_arrays(0.01 * np.arange(2000), inputs={"u": u}, outputs={"y": u})
     assert "periodic" not in str(fid.estimate_response(record).history)

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from functools import partial
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -19,9 +17,6 @@ from flightid.record.stamps import (
     rounded_step_s,
 )
 from flightid.units import DIMENSIONLESS
-
-if TYPE_CHECKING:
-    from flightid.record.samples import LabelledSamples
 
 REPEATING = 0.5
 """Least correlation of inputs a declared period apart."""
@@ -108,38 +103,6 @@ def require_finite(name: str, samples: NDArray[np.float64]) -> None:
             needed="finite numbers",
             action="cut the segment, or fill gaps with a stated policy when resampling",
         )
-
-
-def require_workable(record: LabelledSamples, channels: Iterable[str]) -> None:
-    """Refuse channels of which no powers are numbers.
-
-    A record keeps them, for it is written and read to the last bit; what works on them asks here.
-
-    Raises
-    ------
-    DataError
-        A channel's largest sample is above 1e75, or below 1e-75 and not zero.
-
-    Example
-    -------
-    >>> from flightid.record import Record
-    >>> record = Record.from_arrays([0.0, 0.1], outputs={"p": [1.0, 2.0]})
-    >>> require_workable(record, ["p"])
-    """
-    for name in channels:
-        record.once(("workable", name), partial(_require_size, name, record[name]))
-
-
-def _require_size(name: str, samples: NDArray[np.float64]) -> None:
-    peak = float(np.max(np.abs(samples)))
-    if peak == 0.0 or SMALLEST <= peak <= LARGEST:
-        return
-    raise DataError(
-        f"channel {name!r} is too {'large' if peak > LARGEST else 'small'} to be worked with",
-        found=f"samples up to {peak:.3g}, at index {int(np.argmax(np.abs(samples)))}",
-        needed=f"a largest sample from {SMALLEST:g} to {LARGEST:g}, or zeros alone",
-        action="cut the segment before the fault, or scale the channel to another unit",
-    )
 
 
 def require_period(

@@ -21,7 +21,7 @@ from flightid.models import GreyBoxModel, StateSpaceModel
 from flightid.models.state_space.first_sample import first_outputs
 from flightid.record import Record
 from flightid.record.several import as_records
-from flightid.record.validation import require_workable
+from flightid.record.workable import require_workable
 from flightid.units import require_match
 
 Array = NDArray[np.float64]

@@ -13,7 +13,7 @@ from flightid.errors import DataError, OptionError
 from flightid.frozen import dataclass
 from flightid.record import Record
 from flightid.record.hold import SAME_SAMPLE_TIME
-from flightid.record.validation import require_workable
+from flightid.record.workable import require_workable
 from flightid.units import clash, match
 
 Array = NDArray[np.float64]

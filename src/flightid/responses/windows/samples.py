@@ -14,7 +14,7 @@ from flightid.record.checks import CHECK, checked_history
 from flightid.record.history import Step
 from flightid.record.hold import SAME_SAMPLE_TIME
 from flightid.record.several import as_records
-from flightid.record.validation import require_workable
+from flightid.record.workable import require_workable
 from flightid.units import clash
 
 
